@@ -1,0 +1,1 @@
+"""Sources of problem instances: one file, one source."""

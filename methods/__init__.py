@@ -1,0 +1,1 @@
+"""Rotation synchronization methods: one file, one method."""
