@@ -150,6 +150,8 @@ def method(
     certifies: bool = False,
     deterministic: bool = True,
     max_cameras: int | None = None,
+    exact_to_deg: float = 1e-6,
+    invariant_to_deg: float | None = 1e-3,
 ) -> Callable[[T], T]:
     """Declare a frozen dataclass with a `solve` method as a method.
 
@@ -167,6 +169,11 @@ def method(
         Whether the same problem always gives the same estimate, whatever the seed.
     max_cameras
         The largest problem it is meant for; larger ones become ``skipped`` rows. A field of the same name overrides it.
+    exact_to_deg
+        How closely it promises to recover small noise-free problems.
+    invariant_to_deg
+        How far relabelling cameras, permuting or reversing edges and turning frames may move its answer to a small
+        noisy problem; None promises nothing.
     """
     facts = {
         "install": install,
@@ -176,6 +183,8 @@ def method(
         "certifies": certifies,
         "deterministic": deterministic,
         "max_cameras": max_cameras,
+        "exact_to_deg": exact_to_deg,
+        "invariant_to_deg": invariant_to_deg,
     }
     return _declare("method", name, title, cite, requires, facts, "solve")
 
@@ -251,7 +260,7 @@ def catalog(kind: str, plugins: Sequence[str | Path] = ()) -> Catalog:
     broken: dict[str, str] = {}
     for origin in [*_builtin(kind), *_entry_points(kind), *(_plugin_path(p) for p in plugins)]:
         try:
-            found = _infos(import_origin(origin), kind)
+            found = infos(import_origin(origin), kind)
         except Exception as error:  # a plug-in may fail in any way, and must stay visible
             broken[origin] = f"{type(error).__name__}: {error}"
             continue
@@ -314,7 +323,8 @@ def _plugin_path(path: str | Path) -> str:
     return str(resolved)
 
 
-def _infos(module: types.ModuleType, kind: str) -> list[Info]:
+def infos(module: types.ModuleType, kind: str) -> list[Info]:
+    """Return the plug-ins of one kind that a module declares itself."""
     classes = [value for value in vars(module).values() if isinstance(value, type) and value.__module__ == module.__name__]
     infos = [cls.__dict__[_INFO] for cls in classes if _INFO in cls.__dict__]
     return [info for info in infos if info.kind == kind]

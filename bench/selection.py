@@ -9,6 +9,7 @@ A list is a grid: a selection stands for the cross product of its lists.
 
 import itertools
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bench.errors import InputError
@@ -64,15 +65,19 @@ def format_value(value: object) -> str:
     if not isinstance(value, str):
         return repr(value)
     plain = _TOKEN.fullmatch(value)
-    if plain and plain["word"] and isinstance(_literal(value), str):
+    if plain and plain["word"] == value and isinstance(_literal(value), str):
         return value
     return f'"{value}"' if "'" in value else f"'{value}'"
 
 
-def format_selection(name: str, parameters: dict[str, object]) -> str:
+def format_parameters(parameters: Mapping[str, object]) -> str:
+    """``key=value,key=value``."""
+    return ",".join(f"{key}={format_value(value)}" for key, value in parameters.items())
+
+
+def format_selection(name: str, parameters: Mapping[str, object]) -> str:
     """``name[key=value,...]``, or the bare name where there are no parameters."""
-    inner = ",".join(f"{key}={format_value(value)}" for key, value in parameters.items())
-    return f"{name}[{inner}]" if inner else name
+    return f"{name}[{format_parameters(parameters)}]" if parameters else name
 
 
 def _literal(word: str) -> Value:

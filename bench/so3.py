@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 
 MEAN_TOLERANCE = 1e-12  # radians; far below what any measurement resolves
 MEAN_ITERATIONS = 200
+MEDIAN_STARTS = 32
 
 
 def hat(v: Array) -> Array:
@@ -143,23 +144,37 @@ def karcher_mean(r: Array) -> Array:
 def geodesic_median(r: Array) -> Array:
     """Rotation (3, 3) that minimises the sum of geodesic distances to r (k, 3, 3).
 
-    Weiszfeld's iteration, first on the entries (the geometric median in R^9, a convex problem, so that the
-    start does not depend on the frame and outliers move it little), then on the tangent space (Hartley, Aftab
-    and Trumpf 2011). A member that coincides with the iterate would get infinite weight; distances are
-    floored at `MEAN_TOLERANCE`.
+    Weiszfeld's iteration on the tangent space (Hartley, Aftab and Trumpf 2011), with the step of Vardi and
+    Zhang (2000) where the iterate meets a member: there the plain step is 0/0, and stops whether or not the
+    member is the median. The problem is not convex: the start is the cheapest of the geometric median in R^9
+    (a convex problem), projected, and up to `MEDIAN_STARTS` evenly spaced members. Nothing depends on the
+    frame.
     """
-    center = r.mean(axis=0)
+    members = r[np.unique(np.linspace(0, len(r) - 1, MEDIAN_STARTS).astype(int))]
+    starts = np.concatenate([project(_geometric_median(r))[None], members])
+    median: Array = starts[np.argmin(angle_between(starts[:, None], r).sum(axis=1))]
+    for _ in range(MEAN_ITERATIONS):
+        tangent = log(r @ median.T)
+        distance = np.linalg.norm(tangent, axis=-1)
+        met = distance < MEAN_TOLERANCE
+        weight = np.divide(1, distance, out=np.zeros_like(distance), where=~met)
+        pull = weight @ tangent
+        excess = np.linalg.norm(pull) - met.sum()
+        if excess <= 0:
+            break
+        step = excess / np.linalg.norm(pull) * pull / weight.sum()
+        median = exp(step) @ median
+        if np.linalg.norm(step) < MEAN_TOLERANCE:
+            break
+    return median
+
+
+def _geometric_median(r: Array) -> Array:
+    """Matrix (3, 3) that minimises the sum of Frobenius distances to r (k, 3, 3), to 1e-6 (Weiszfeld)."""
+    center: Array = r.mean(axis=0)
     for _ in range(MEAN_ITERATIONS):
         weight = 1 / np.maximum(np.linalg.norm(r - center, axis=(1, 2)), MEAN_TOLERANCE)
         previous, center = center, np.average(r, axis=0, weights=weight)
         if np.linalg.norm(center - previous) < 1e-6:
             break
-    median = project(center)
-    for _ in range(MEAN_ITERATIONS):
-        tangent = log(r @ median.T)
-        weight = 1 / np.maximum(np.linalg.norm(tangent, axis=-1), MEAN_TOLERANCE)
-        step = weight @ tangent / weight.sum()
-        median = exp(step) @ median
-        if np.linalg.norm(step) < MEAN_TOLERANCE:
-            break
-    return median
+    return center

@@ -1,0 +1,1 @@
+"""Scores as pure functions of what is stored: another metric or alignment never needs a re-run."""

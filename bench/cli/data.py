@@ -1,0 +1,96 @@
+"""``bench data``: what is on disk, and how to get the rest."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bench.cli.options import DataDirOption, Protocol, ProtocolOption
+
+app = typer.Typer(help="List, fetch, verify and inspect data.", no_args_is_help=True)
+
+Name = Annotated[str, typer.Argument(metavar="DATASET", help="A selection, such as '1dsfm[scene=Ellis_Island]'.")]
+
+
+@app.command("list")
+def list_(name: Name = "1dsfm", data_dir: DataDirOption = None, protocol: ProtocolOption = None) -> None:
+    """List the instances of a dataset, on disk or not, with the command that gets what is missing."""
+    from bench.registry import Missing
+
+    for source in _sources(name, data_dir, protocol):
+        if isinstance(source, Missing):
+            typer.echo(f"missing   {source.name:<24} {source.command}")
+        else:
+            typer.echo(f"here      {source.name:<24} {source.revision[:12]}")
+
+
+@app.command("inspect")
+def inspect(name: Name, data_dir: DataDirOption = None, protocol: ProtocolOption = None) -> None:
+    """Load the instances of a dataset and print what is known of them."""
+    import numpy as np
+
+    from bench.registry import Missing
+
+    for source in _sources(name, data_dir, protocol):
+        if isinstance(source, Missing):
+            typer.echo(f"{source.name}: not on disk; {source.command}")
+            continue
+        instance = source.load()
+        problem = instance.problem
+        typer.echo(f"{instance.name}: {problem.n} cameras, {problem.m} edges, protocol {instance.protocol}")
+        sizes = np.bincount(problem.components)
+        typer.echo(f"  components {', '.join(map(str, sizes[:8]))}{'…' if len(sizes) > 8 else ''}")
+        for key, value in instance.statistics.items():
+            typer.echo(f"  {key} {value:.4g}")
+        if instance.truth is not None:
+            known = np.isfinite(instance.truth).all(axis=(1, 2))
+            residuals = np.degrees(problem.residuals(instance.truth))
+            residuals = residuals[np.isfinite(residuals)]
+            typer.echo(
+                f"  truth on {known.sum()} cameras; residual of the measurements there: median "
+                f"{np.median(residuals):.2f} degrees, {100 * np.mean(residuals > 30):.1f} % over 30"
+            )
+        typer.echo(f"  source {instance.source}, revision {instance.revision[:12]}")
+        for note in instance.notes:
+            typer.echo(f"  note: {note}")
+
+
+@app.command("fetch")
+def fetch(
+    name: Annotated[str, typer.Argument(metavar="DATASET")],
+    to: Annotated[Path | None, typer.Option("--to", metavar="DIR", help="Folder.  [default: the download cache]")] = None,
+) -> None:
+    """Download a dataset: checksum, progress, resumed where it was interrupted."""
+    configured = _fetchable(name)
+    typer.echo(f"{name} is in {configured.fetch(to)}")
+
+
+@app.command("verify")
+def verify(name: Annotated[str, typer.Argument(metavar="DATASET")], data_dir: DataDirOption = None) -> None:
+    """Read every instance on disk and say what is wrong; exit code 1 where something is."""
+    wrong = 0
+    for scene, state in _fetchable(name).verify(data_dir):
+        wrong += state != "ok"
+        typer.echo(f"{scene:<24} {state}")
+    raise typer.Exit(1 if wrong else 0)
+
+
+def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> list:  # type: ignore[type-arg]
+    from bench import registry
+
+    found = []
+    for info, parameters in registry.catalog("dataset").select([name]):
+        if protocol is not None and "protocol" in info.defaults():
+            parameters |= {"protocol": protocol.value}
+        found += list(info.configure(parameters).sources(data_dir, 0))
+    return found
+
+
+def _fetchable(name: str):  # type: ignore[no-untyped-def]  # noqa: ANN202
+    from bench import registry
+    from bench.errors import InputError
+
+    info = registry.catalog("dataset")[name]
+    if not info.facts["fetchable"]:
+        raise InputError(f"dataset '{name}' is made on this machine; there is nothing to fetch")
+    return info.configure({})

@@ -1,0 +1,49 @@
+"""``bench list``: what there is."""
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from bench.cli.options import PluginOption
+
+
+class What(StrEnum):
+    """What can be listed."""
+
+    METHODS = "methods"
+    DATASETS = "datasets"
+    SUITES = "suites"
+
+
+def list_(what: Annotated[What, typer.Argument()], plugin: PluginOption = None) -> None:
+    """List methods, datasets or suites; broken plug-ins are listed with the reason."""
+    if what is What.SUITES:
+        _list_suites()
+    else:
+        _list_plugins(what.value.removesuffix("s"), plugin or [])
+
+
+def _list_suites() -> None:
+    from bench.experiment import load_suite, suite_names
+
+    for name in suite_names():
+        suite = load_suite(name)
+        typer.echo(f"{name:<10} {suite.title}")
+
+
+def _list_plugins(kind: str, plugins: list) -> None:  # type: ignore[type-arg]
+    from bench import registry, selection
+
+    found = registry.catalog(kind, plugins)
+    for info in sorted(found, key=lambda info: info.name):
+        state = f"   not installed: {info.install_hint}" if info.not_installed else ""
+        typer.echo(f"{info.name:<15} {info.summary}{state}")
+        details = [selection.format_selection("defaults", info.defaults())]
+        details += [f"cite {info.cite}"] if info.cite else []
+        details += [name.replace("_", " ") for name in ("robust", "certifies") if info.facts.get(name)]
+        if info.facts.get("max_cameras"):
+            details.append(f"up to {info.facts['max_cameras']} cameras")
+        typer.echo(f"{'':<15}   {'; '.join(details)}")
+    for origin, why in found.broken.items():
+        typer.echo(f"broken: {origin}: {why}")

@@ -1,0 +1,61 @@
+"""Options that several verbs share."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class Align(StrEnum):
+    """Gauge alignment rules."""
+
+    L1 = "l1"
+    CHORDAL = "chordal"
+    KARCHER = "karcher"
+    ANCHORS = "anchors"
+
+
+class Protocol(StrEnum):
+    """Which cameras of a real scene are solved and scored."""
+
+    TRUTH_SUBGRAPH = "truth-subgraph"
+    COMPONENT = "component"
+
+
+class Rerun(StrEnum):
+    """Which finished jobs are run again."""
+
+    NEVER = "never"
+    FAILED = "failed"
+    ALWAYS = "always"
+
+
+class Format(StrEnum):
+    """How a table is written."""
+
+    CONSOLE = "console"
+    MARKDOWN = "markdown"
+    CSV = "csv"
+    LATEX = "latex"
+
+
+RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or its name under results/runs.")]
+AlignOption = Annotated[Align, typer.Option("--align", help="Rule that removes the gauge; re-scores, runs nothing.")]
+ProtocolOption = Annotated[
+    Protocol | None, typer.Option("--protocol", help="Which cameras of a real scene are solved and scored.")
+]
+PluginOption = Annotated[
+    list[Path] | None, typer.Option("--plugin", metavar="FILE", help="Python file with more methods or datasets.")
+]
+DataDirOption = Annotated[
+    Path | None, typer.Option("--data-dir", metavar="DIR", help="Folder where data are looked for first.")
+]
+
+
+def run_folder(given: Path) -> Path:
+    """Folder of a run from its path or its name."""
+    from bench.runner import RUNS_FOLDER
+
+    named = RUNS_FOLDER / given
+    return named if not given.exists() and named.is_dir() else given

@@ -1,0 +1,140 @@
+"""``bench run``: compare methods, then say where tables and plots are."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bench.cli.options import Align, AlignOption, DataDirOption, PluginOption, Protocol, ProtocolOption, Rerun
+
+if TYPE_CHECKING:
+    from bench.runner import Run
+
+EPILOG = (
+    "Examples: python -m bench run | "
+    "python -m bench run --suite 1dsfm --data-dir DIR | "
+    "python -m bench run -m 'dmf-synch[depth=[2,3]]' -m l1-irls -d 'erdos-renyi[n=100,missing=0.8]' --seeds 10"
+)
+
+
+def run(
+    suite: Annotated[
+        str | None, typer.Option("--suite", metavar="S", help="Named suite or TOML file.  [default: quick]")
+    ] = None,
+    method: Annotated[
+        list[str] | None, typer.Option("--method", "-m", metavar="M", help="Only these methods; repeat for more.")
+    ] = None,
+    dataset: Annotated[
+        list[str] | None, typer.Option("--dataset", "-d", metavar="D", help="Only these datasets; repeat for more.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of the run.  [default: results/runs/SUITE]")
+    ] = None,
+    data_dir: DataDirOption = None,
+    seeds: Annotated[int | None, typer.Option(metavar="N", help="Seeds 0 to N-1.")] = None,
+    jobs: Annotated[int | None, typer.Option(metavar="N", help="Jobs at a time.  [default: one a core]")] = None,
+    threads: Annotated[int, typer.Option(metavar="N", help="Threads of the numerical libraries in each job.")] = 1,
+    timeout: Annotated[float | None, typer.Option(metavar="S", help="Wall clock seconds of one job.")] = None,
+    memory: Annotated[float | None, typer.Option(metavar="GIB", help="Resident memory of one job.")] = None,
+    protocol: ProtocolOption = None,
+    align: AlignOption = Align.L1,
+    rerun: Annotated[Rerun, typer.Option(help="Which finished jobs are run again.")] = Rerun.NEVER,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run, and run nothing.")] = False,
+    plugin: PluginOption = None,
+) -> None:
+    """Run a suite: every method on every instance, each job in a child process with limits.
+
+    What is done and unchanged is not run again: after Ctrl-C, the same command continues.
+    """
+    from bench.runner import Options, Run
+
+    options = Options(
+        out=out,
+        data_dir=data_dir,
+        seeds=seeds,
+        jobs=jobs,
+        threads=threads,
+        timeout_s=timeout,
+        memory_gib=memory,
+        protocol=protocol.value if protocol else None,
+        rerun=rerun.value,
+        plugins=tuple(plugin or ()),
+    )
+    planned = Run(suite, method or (), dataset or (), options)
+    typer.echo(_intention(planned))
+    if dry_run:
+        _list_cells(planned)
+        return
+    planned.prepare(typer.echo)
+    try:
+        _execute(planned)
+    except KeyboardInterrupt:
+        typer.echo(f"\ninterrupted; what is done is kept in {planned.store.folder}, and the same command continues", err=True)
+        raise typer.Exit(130) from None
+    _present(planned, align)
+
+
+def _intention(planned: "Run") -> str:
+    todo, total = len(planned.todo), len(planned.cells)
+    instances = len({cell.job.instance_key for cell in planned.cells})
+    done = f", {total - todo} of them done already" if todo < total else ""
+    return f"suite {planned.experiment.suite.name}: {total} jobs on {instances} instances{done} -> {planned.store.folder}"
+
+
+def _list_cells(planned: "Run") -> None:
+    from bench.selection import format_selection
+
+    todo = {cell.job.id for cell in planned.todo}
+    for cell in planned.cells:
+        job = cell.job
+        state = "to run" if job.id in todo else "done"
+        method = format_selection(job.method, job.parameters)
+        typer.echo(f"{state:<7} {job.dataset} {job.instance} seed {job.seed} {method}")
+    for sentence in planned.experiment.missing:
+        typer.echo(f"missing: {sentence}")
+
+
+def _execute(planned: "Run") -> None:
+    """Run what is to do, one line a job, with a progress bar and an ETA where there is a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    from bench.selection import format_selection
+
+    console = Console(highlight=False, soft_wrap=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("ETA"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
+        task = progress.add_task("jobs", total=len(planned.todo))
+        for count, (cell, record) in enumerate(planned.execute(), start=1):
+            progress.advance(task)
+            job = cell.job
+            seconds = f"{record['solve_s']:.2f} s" if "solve_s" in record else ""
+            method = format_selection(job.method, job.parameters)
+            line = f"{count:>4}/{len(planned.todo)}  {job.instance:<24} {method:<32} {seconds:>10}  {record['status']}"
+            console.print(line, markup=False)
+
+
+def _present(planned: "Run", align: Align) -> None:
+    import shutil
+
+    from bench.reporting.present import render_table, write_plots, write_tables
+    from bench.results import score
+
+    results = score(planned.store, align.value, planned.options.protocol)
+    width = shutil.get_terminal_size((100, 24)).columns
+    text, _ = render_table(results, "console", width=width, terminal=sys.stdout.isatty())
+    typer.echo(f"\n{text}")
+    folder = planned.store.folder
+    write_tables(results, folder / "tables")
+    plots = write_plots(results, folder / "plots")
+    typer.echo(f"tables: {folder / 'tables'} (console, Markdown, CSV, LaTeX)")
+    typer.echo(f"plots:  {folder / 'plots'} (PNG, PDF, SVG)" if plots else "plots:  none, nothing was scored")
+    typer.echo(f"again:  python -m bench table {folder} --align chordal --format latex")

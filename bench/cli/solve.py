@@ -1,0 +1,56 @@
+"""``bench solve``: the user's own graph."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bench.cli.options import PluginOption
+
+
+def solve(
+    graph: Annotated[Path, typer.Argument(help="1DSfM folder, EGs.txt, .g2o or .npz.")],
+    method: Annotated[str, typer.Option("--method", "-m", help="A selection, such as 'l1-irls'.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help=".npz or .txt for the absolute rotations.")],
+    seed: Annotated[int, typer.Option()] = 0,
+    timeout: Annotated[float, typer.Option(metavar="SECONDS")] = 3600,
+    memory: Annotated[float, typer.Option(metavar="GIB")] = 16,
+    threads: Annotated[int, typer.Option(help="Threads of the numerical libraries.")] = 1,
+    plugin: PluginOption = None,
+) -> None:
+    """Solve one graph with one method and write the absolute rotations (world to camera)."""
+    from bench import registry
+    from bench.errors import InputError
+    from bench.execution.single import SingleSolver
+    from bench.execution.supervise import Limits
+    from bench.formats import read_graph, rotations_writer
+
+    write = rotations_writer(out)
+    chosen = registry.catalog("method", plugin or []).select([method])
+    if len(chosen) != 1:
+        raise InputError(f"solve takes one method, and '{method}' stands for {len(chosen)}")
+    loaded = read_graph(graph)
+    problem = loaded.problem
+    typer.echo(f"{graph}: {problem.n} cameras, {problem.m} edges")
+    with SingleSolver(*chosen[0], Limits(timeout, memory), threads) as solver:
+        ended, report, estimate = solver.solve(problem, seed)
+    for note in (*loaded.notes, *report.get("notes", ())):
+        typer.echo(f"note: {note}")
+    if estimate is None:
+        typer.echo(f"{method}: {ended.text}", err=True)
+        raise typer.Exit(1)
+    write(loaded.cameras, estimate.rotations)
+    residuals = problem.residuals(estimate.rotations)
+    typer.echo(_summary(method, report["solve_s"], residuals))
+    typer.echo(f"wrote {out}")
+
+
+def _summary(method: str, seconds: float, residuals: "object") -> str:
+    import numpy as np
+
+    degrees = np.degrees(np.asarray(residuals, dtype=float))
+    share = np.mean(degrees[np.isfinite(degrees)] < 5)
+    return (
+        f"{method}: {seconds:.2f} s, median edge residual {np.nanmedian(degrees):.3f} degrees, "
+        f"{100 * share:.0f} % of edges below 5"
+    )

@@ -1,0 +1,27 @@
+"""``bench table``: score a run again and print its table."""
+
+import shutil
+import sys
+
+import typer
+
+from bench.cli.options import Align, AlignOption, Format, ProtocolOption, RunFolder, run_folder
+
+
+def table(
+    run: RunFolder,
+    align: AlignOption = Align.L1,
+    protocol: ProtocolOption = None,
+    format: Format = Format.CONSOLE,  # noqa: A002 - the name of the option
+) -> None:
+    """Print the table of a run; nothing is run. Notes go to standard error."""
+    from bench.reporting.present import render_table
+    from bench.results import score
+    from bench.store import Store
+
+    results = score(Store.open(run_folder(run)), align.value, protocol.value if protocol else None)
+    width = shutil.get_terminal_size((100, 24)).columns
+    text, footnotes = render_table(results, format.value, width=width, terminal=sys.stdout.isatty())
+    typer.echo(text, nl=not text.endswith("\n"))
+    for note in footnotes:
+        typer.echo(note, err=True)

@@ -1,0 +1,279 @@
+"""What happens inside the process that runs a method.
+
+The process is given the problem, never the truth: a request names the file of the problem, the method and
+the folder for its two results, ``estimate.npz`` and ``result.json`` (written last).
+"""
+
+import dataclasses
+import importlib
+import json
+import os
+import sys
+import time
+import traceback
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench import registry
+from bench.execution import outcome
+from bench.execution.outcome import Outcome
+from bench.problem import ROTATION_TOLERANCE, Checkpoint, Estimate, Floats, Problem, Skipped
+from bench.seeds import stream
+
+ESTIMATE_FILE = "estimate.npz"
+RESULT_FILE = "result.json"
+
+
+@dataclass(frozen=True)
+class Request:
+    """One job, as the child is told of it.
+
+    Parameters
+    ----------
+    problem
+        Path of an ``.npz`` written by `save_problem`.
+    origin, method, parameters
+        Module (or file) of the plug-in, its name, and the parameters given.
+    seed
+        Seed of the run; the method gets the stream ``("method", name)`` of it.
+    threads
+        How many threads the numerical libraries may use.
+    folder
+        Where the results go.
+    """
+
+    problem: str
+    origin: str
+    method: str
+    parameters: dict[str, Any]
+    seed: int
+    threads: int
+    folder: str
+
+
+def save_problem(path: Path, problem: Problem) -> None:
+    """Write a problem as uncompressed ``.npz``."""
+    arrays: dict[str, Any] = {"n": problem.n, "edges": problem.edges, "rotations": problem.rotations}
+    if problem.weights is not None:
+        arrays["weights"] = problem.weights
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def load_problem(path: Path) -> Problem:
+    """Read what `save_problem` wrote."""
+    with np.load(path, allow_pickle=False) as data:
+        weights = data["weights"] if "weights" in data else None
+        return Problem(int(data["n"]), data["edges"], data["rotations"], weights)
+
+
+def run(request: Request) -> None:
+    """Run the job and write its results; whatever happens in Python becomes an outcome."""
+    result: dict[str, Any] = {}
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            ended = _solve(request, result)
+        result["warnings"] = sorted({f"{w.category.__name__}: {w.message}" for w in caught})
+    except Skipped as skip:
+        ended = Outcome(outcome.SKIPPED, str(skip))
+    except MemoryError as error:
+        ended = Outcome(outcome.OUT_OF_MEMORY, str(error))
+    except Exception as error:
+        traceback.print_exc()
+        ended = Outcome(outcome.ERROR, f"{type(error).__name__}: {error}")
+    result |= {"kind": ended.kind, "detail": ended.detail}
+    temporary = Path(request.folder, RESULT_FILE + ".part")
+    temporary.write_text(json.dumps(result), encoding="utf-8")
+    temporary.replace(Path(request.folder, RESULT_FILE))
+
+
+def _solve(request: Request, result: dict[str, Any]) -> Outcome:
+    registry.import_origin(request.origin)
+    info = _info(request)
+    method = info.configure(request.parameters)
+    problem = load_problem(Path(request.problem))
+    limit = getattr(method, "max_cameras", info.facts["max_cameras"])
+    if limit is not None and problem.n > limit:
+        raise Skipped(f"{problem.n} cameras, and {info.name} is meant for at most {limit}")
+    for name in info.requires:
+        importlib.import_module(name)
+    result["threads"] = _pin_threads(request.threads)
+    if hasattr(method, "warm_up"):
+        method.warm_up()
+
+    cameras = np.flatnonzero(problem.components == 0)
+    connected = len(cameras) == problem.n
+    solved, kept = (problem, np.ones(problem.m, bool)) if connected else problem.subgraph(cameras)
+    rng = stream(request.seed, "method", info.name)
+    memory = _PeakMemory()
+    start = time.perf_counter()
+    answer = method.solve(solved, rng)
+    result["solve_s"] = time.perf_counter() - start
+    result["peak_mib"] = memory.peak_mib()
+
+    estimate = answer if isinstance(answer, Estimate) else Estimate(answer)
+    wrong = _what_is_wrong(solved, estimate)
+    if wrong:
+        return Outcome(outcome.INVALID_OUTPUT, wrong)
+    if not connected:
+        estimate = _lifted(estimate, problem, cameras, kept)
+    result |= _scalars(estimate)
+    save_estimate(Path(request.folder, ESTIMATE_FILE), estimate)
+    return Outcome(outcome.OK)
+
+
+def _info(request: Request) -> registry.Info:
+    module = registry.import_origin(request.origin)
+    return next(info for info in registry.infos(module, "method") if info.name == request.method)
+
+
+def _what_is_wrong(problem: Problem, estimate: Estimate) -> str:
+    """Say why the estimate cannot be scored, or nothing."""
+    rotations = estimate.rotations
+    if not isinstance(rotations, np.ndarray) or rotations.shape != (problem.n, 3, 3):
+        shape = getattr(rotations, "shape", type(rotations).__name__)
+        return f"rotations must be an array of shape ({problem.n}, 3, 3), not {shape}"
+    if not np.issubdtype(rotations.dtype, np.floating):
+        return f"rotations must be floating point, not {rotations.dtype}"
+    missing = np.isnan(rotations).all(axis=(1, 2))
+    if missing.all():
+        return "no camera was solved"
+    solved = rotations[~missing].astype(float)
+    if not np.isfinite(solved).all():
+        return f"{(~np.isfinite(solved).all(axis=(1, 2))).sum()} cameras have entries that are not finite"
+    off = np.linalg.norm(solved @ solved.transpose(0, 2, 1) - np.eye(3), axis=(1, 2))
+    bad = (off > ROTATION_TOLERANCE) | (np.linalg.det(solved) < 0)
+    if bad.any():
+        return f"{bad.sum()} of {len(solved)} matrices are not rotations to {ROTATION_TOLERANCE:g}"
+    if estimate.edge_weights is not None and np.shape(estimate.edge_weights) != (problem.m,):
+        return f"edge_weights must have shape ({problem.m},), not {np.shape(estimate.edge_weights)}"
+    return ""
+
+
+def _lifted(estimate: Estimate, problem: Problem, cameras: Any, kept: Any) -> Estimate:
+    """Put an estimate of the largest component into the whole graph, NaN elsewhere."""
+
+    def spread(values: Floats, size: int, where: Any) -> Floats:
+        out = np.full((size, *values.shape[1:]), np.nan)
+        out[where] = values
+        return out
+
+    note = f"disconnected graph: solved on its largest component, {len(cameras)} of {problem.n} cameras"
+    weights = estimate.edge_weights
+    return dataclasses.replace(
+        estimate,
+        rotations=spread(estimate.rotations, problem.n, cameras),
+        edge_weights=None if weights is None else spread(np.asarray(weights), problem.m, kept),
+        checkpoints=tuple(
+            dataclasses.replace(c, rotations=spread(c.rotations, problem.n, cameras)) for c in estimate.checkpoints
+        ),
+        notes=(*estimate.notes, note),
+    )
+
+
+def _scalars(estimate: Estimate) -> dict[str, Any]:
+    return {
+        "iterations": None if estimate.iterations is None else int(estimate.iterations),
+        "stop_reason": estimate.stop_reason,
+        "cost": None if estimate.cost is None else float(estimate.cost),
+        "certificate": None if estimate.certificate is None else float(estimate.certificate),
+        "notes": list(estimate.notes),
+        "checkpoints": [
+            {"iteration": c.iteration, "seconds": c.seconds, "diagnostics": dict(c.diagnostics)}
+            for c in estimate.checkpoints
+        ],
+    }
+
+
+def save_estimate(path: Path, estimate: Estimate) -> None:
+    """Write the arrays of an estimate, float64 and unrounded, as ``.npz``."""
+    arrays = {"rotations": np.asarray(estimate.rotations, dtype=np.float64)}
+    if estimate.edge_weights is not None:
+        arrays["edge_weights"] = np.asarray(estimate.edge_weights, dtype=np.float64)
+    if estimate.checkpoints:
+        arrays["checkpoints"] = np.stack([c.rotations for c in estimate.checkpoints])
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
+    """Read what `save_estimate` wrote, with the scalars that the record holds."""
+    with np.load(path, allow_pickle=False) as data:
+        states = data["checkpoints"] if "checkpoints" in data else ()
+        return Estimate(
+            rotations=data["rotations"],
+            edge_weights=data["edge_weights"] if "edge_weights" in data else None,
+            iterations=scalars.get("iterations"),
+            stop_reason=scalars.get("stop_reason", ""),
+            cost=scalars.get("cost"),
+            certificate=scalars.get("certificate"),
+            checkpoints=tuple(
+                Checkpoint(rotations=state, **facts)
+                for state, facts in zip(states, scalars.get("checkpoints", ()), strict=True)
+            ),
+            notes=tuple(scalars.get("notes", ())),
+        )
+
+
+def _pin_threads(threads: int) -> int:
+    """Pin every numerical library that is loaded, and return the largest number of threads that any still has."""
+    import threadpoolctl
+
+    threadpoolctl.threadpool_limits(threads)
+    counts = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
+    torch = sys.modules.get("torch")
+    if torch is not None:
+        torch.set_num_threads(threads)
+        counts.append(torch.get_num_threads())
+    return max(counts, default=threads)
+
+
+class _PeakMemory:
+    """Resident memory that is added between now and the peak.
+
+    Linux can reset the peak that it remembers; elsewhere the peak of the whole process counts.
+    """
+
+    def __init__(self) -> None:
+        try:
+            Path("/proc/self/clear_refs").write_text("5")
+        except OSError:
+            self._before = _peak_mib()
+        else:
+            self._before = _status_mib("VmRSS")
+
+    def peak_mib(self) -> float:
+        return max(_peak_mib() - self._before, 0.0)
+
+
+def _peak_mib() -> float:
+    try:
+        return _status_mib("VmHWM")
+    except OSError:
+        import psutil
+
+        memory = psutil.Process().memory_info()
+        return getattr(memory, "peak_wset", memory.rss) / 2**20
+
+
+def _status_mib(field: str) -> float:
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith(field + ":"):
+            return int(line.split()[1]) / 1024
+    raise OSError(f"/proc/self/status has no {field}")
+
+
+def main() -> None:
+    """Run the request in the file given as the only argument: the way without a fork server."""
+    run(Request(**json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))))
+    sys.stdout.flush()
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,91 @@
+"""The local engine: threads that each supervise one child at a time."""
+
+import threading
+from collections.abc import Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import asdict
+from typing import Any
+
+from bench.execution import outcome
+from bench.execution.child import ESTIMATE_FILE, Request
+from bench.execution.job import execute, record_of
+from bench.execution.launch import Launcher
+from bench.execution.outcome import Outcome
+from bench.execution.supervise import Interrupted, Limits
+from bench.experiment import Cell
+from bench.store import Store
+
+Finished = tuple[Cell, dict[str, Any]]
+
+
+class LocalEngine:
+    """Runs cells on this machine, `workers` at a time.
+
+    Parameters
+    ----------
+    store
+        Where instances are and records go.
+    limits
+        Of one job.
+    workers
+        How many children at a time.
+    threads
+        How many threads the numerical libraries of each child may use.
+    """
+
+    def __init__(self, store: Store, limits: Limits, workers: int, threads: int) -> None:
+        self.store = store
+        self.limits = limits
+        self.workers = workers
+        self.threads = threads
+        self.launcher = Launcher(threads)
+        self.stop = threading.Event()
+
+    def run(self, cells: Iterable[Cell]) -> Iterator[Finished]:
+        """Yield each cell with its record as soon as it is stored.
+
+        When the caller stops iterating, jobs in progress are ended without a record.
+        """
+        waiting: set[Future[Finished]] = set()
+        pool = ThreadPoolExecutor(self.workers)
+        try:
+            for cell in cells:
+                waiting.add(pool.submit(self._run_one, cell))
+                if len(waiting) >= 2 * self.workers:
+                    done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                    yield from (future.result() for future in done)
+            while waiting:
+                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in done)
+        finally:
+            self.stop.set()
+            pool.shutdown(cancel_futures=True)
+            self.launcher.close()
+
+    def _run_one(self, cell: Cell) -> Finished:
+        job = cell.job
+        if self.stop.is_set():
+            raise Interrupted
+        if cell.method.not_installed:
+            hint = Outcome(outcome.NOT_INSTALLED, cell.method.install_hint)
+            record = record_of(asdict(job), (), self.limits, hint, {})
+            self.store.add_record(job.id, record, None)
+            return cell, record
+        requires = cell.method.requires
+        with self.store.work_folder() as work:
+            request = Request(
+                problem=str(self.store.problem_path(job.instance_key).resolve()),
+                origin=job.origin,
+                method=job.method,
+                parameters=dict(job.parameters),
+                seed=job.seed,
+                threads=self.threads,
+                folder=str(work.resolve()),
+            )
+            try:
+                ended, report = execute(request, requires, self.launcher, self.limits, self.stop)
+            except RuntimeError as error:  # the fork server could not be started
+                ended, report = Outcome(outcome.CRASHED, str(error)), {}
+            record = record_of(asdict(job), requires, self.limits, ended, report)
+            self.store.add_record(job.id, record, work / ESTIMATE_FILE if ended.kind == outcome.OK else None)
+        return cell, record

@@ -1,0 +1,178 @@
+"""From a suite to jobs: the cross product of instances, methods and seeds, each with its identity."""
+
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from bench import registry, selection
+from bench.errors import InputError
+from bench.registry import Catalog, Info, Missing, Source, parameters_of
+from bench.store import SCHEMA, Job, digest
+
+DEFAULT_SUITE = "quick"
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What is compared on what.
+
+    Parameters
+    ----------
+    name, title
+        Its id and what it is for.
+    datasets, methods
+        Selections.
+    seeds
+        How many seeds, 0 to seeds - 1.
+    timeout_s, memory_gib
+        Limits of one job.
+    """
+
+    name: str
+    title: str
+    datasets: tuple[str, ...]
+    methods: tuple[str, ...]
+    seeds: int = 1
+    timeout_s: float = 600.0
+    memory_gib: float = 8.0
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A job with what is needed to run it."""
+
+    job: Job
+    source: Source
+    method: Info
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A resolved suite: the cells to run, and a sentence for everything that was not found."""
+
+    suite: Suite
+    cells: tuple[Cell, ...]
+    missing: tuple[str, ...]
+
+
+def suite_names() -> list[str]:
+    """Names of the suites that come with the project."""
+    folder = resources.files("bench.suites")
+    return sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".toml"))
+
+
+def load_suite(name: str) -> Suite:
+    """Read a suite by its name, or by the path of a TOML file.
+
+    Raises
+    ------
+    InputError
+        Where there is no such suite, or the file is not one.
+    """
+    if name.endswith(".toml"):
+        path = Path(name)
+        if not path.is_file():
+            raise InputError(f"there is no suite file {name}")
+        text, where, stem = path.read_text(encoding="utf-8"), name, path.stem
+    else:
+        names = suite_names()
+        if name not in names:
+            raise InputError(f"there is no suite '{name}'{registry.suggestion(name, names)}")
+        text, where, stem = (resources.files("bench.suites") / f"{name}.toml").read_text(), f"suite {name}", name
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{where} is not valid TOML: {error}") from error
+    return _checked_suite(stem, where, content)
+
+
+_FIELDS: dict[str, tuple[type, ...]] = {
+    "title": (str,),
+    "datasets": (list,),
+    "methods": (list,),
+    "seeds": (int,),
+    "timeout_s": (int, float),
+    "memory_gib": (int, float),
+}
+
+
+def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
+    for key, value in content.items():
+        if key not in _FIELDS:
+            raise InputError(f"{where}: unknown key '{key}'{registry.suggestion(key, _FIELDS)}")
+        if not isinstance(value, _FIELDS[key]) or isinstance(value, bool):
+            raise InputError(f"{where}: '{key}' must be a {_FIELDS[key][0].__name__}, not {value!r}")
+    for key in ("datasets", "methods"):
+        if not content.get(key) or not all(isinstance(text, str) for text in content[key]):
+            raise InputError(f"{where}: '{key}' must be a list of selections, such as {key} = ['name[parameter=1]']")
+        content[key] = tuple(content[key])
+    return Suite(name, content.pop("title", name), **content)
+
+
+def narrowed(suite_selections: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
+    """Apply ``-m`` or ``-d`` to a suite's list: a bare name that the suite configures means the suite's configurations of it."""
+    out: list[str] = []
+    for text in wanted:
+        parsed = selection.parse(text)
+        same_name = [s for s in suite_selections if selection.parse(s).name == parsed.name]
+        out += same_name if same_name and not parsed.grid else [text]
+    return tuple(out)
+
+
+def resolve(
+    suite: Suite,
+    methods: Catalog,
+    datasets: Catalog,
+    *,
+    data_dir: Path | None = None,
+    protocol: str | None = None,
+) -> Experiment:
+    """Expand a suite into cells, instance by instance.
+
+    Raises
+    ------
+    InputError
+        On unknown names or parameters, or where the data that were asked for are malformed.
+    """
+    chosen = methods.select(suite.methods)
+    missing: dict[str, None] = {}
+    cells: list[Cell] = []
+    for info, parameters in datasets.select(suite.datasets):
+        if protocol is not None and "protocol" in info.defaults():
+            parameters = parameters | {"protocol": protocol}
+        configured = info.configure(parameters)
+        label = selection.format_selection(info.name, parameters)
+        for seed in range(suite.seeds):
+            for source in configured.sources(data_dir, seed):
+                if isinstance(source, Missing):
+                    missing[f"{info.name}/{source.name} is not on disk; get it with: {source.command}"] = None
+                elif source.seeded or seed == 0:
+                    cells += _cells_of(source, info, configured, label, seed, suite.seeds, chosen)
+    return Experiment(suite, tuple(cells), tuple(missing))
+
+
+def _cells_of(
+    source: Source,
+    dataset: Info,
+    configured: Any,
+    label: str,
+    seed: int,
+    seeds: int,
+    methods: Iterable[tuple[Info, dict[str, Any]]],
+) -> list[Cell]:
+    """Cells of one instance. On data that no seed changes, a deterministic method needs one seed only."""
+    key = digest([dataset.name, parameters_of(configured), source.name, source.revision])
+    cells = []
+    for info, parameters in methods:
+        repeated = not source.seeded and not info.facts["deterministic"]
+        for method_seed in range(seeds) if repeated else (seed,):
+            complete = parameters_of(info.configure(parameters))
+            identity = digest([SCHEMA, key, info.name, complete, info.source_hash, method_seed])
+            job = Job(
+                identity, label, source.name, key, info.name, info.title, info.origin, parameters, method_seed
+            )
+            cells.append(Cell(job, source, info))
+    return cells

@@ -1,0 +1,121 @@
+"""Tables of numbers in text files; whatever cannot be read is named with its file and line."""
+
+from array import array
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import InputError
+
+Row = tuple[int, list[str]]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Rows of a text file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    lines
+        (k,) line number of each row, from 1.
+    ids
+        (k, a) whole numbers at the start of each row.
+    numbers
+        (k, b) the other numbers of the row, NaN and infinity included.
+    """
+
+    path: Path
+    lines: NDArray[np.int64]
+    ids: NDArray[np.int64]
+    numbers: NDArray[np.float64]
+
+    def where(self, row: int) -> str:
+        """``file:line`` of a row."""
+        return f"{self.path}:{self.lines[row]}"
+
+
+def read_bytes(path: Path) -> bytes:
+    """All bytes of a file; `InputError` where it is not there, cannot be read or is empty."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    if not data.strip():
+        raise InputError(f"{path}: the file is empty")
+    return data
+
+
+def decode(path: Path, data: bytes) -> str:
+    """Text of bytes that must be ASCII; `InputError` names the line of the first byte that is not."""
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    try:
+        return data.decode("ascii")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"{path}:{line}: byte 0x{data[error.start]:02x} is not plain text; is this the right file?"
+        ) from None
+
+
+def rows(path: Path) -> Iterator[Row]:
+    """Line number and words of each line that is not blank."""
+    for line, text in enumerate(decode(path, read_bytes(path)).split("\n"), 1):
+        words = text.split()
+        if words:
+            yield line, words
+
+
+def parse(path: Path, source: Iterable[Row], ids: int, numbers: int, layout: str) -> Table:
+    """Parse rows of `ids` whole numbers followed by `numbers` numbers.
+
+    Parameters
+    ----------
+    layout
+        What a row holds, in words, for the messages.
+
+    Raises
+    ------
+    InputError
+        Naming the file and line with too few or too many words, or one that is not a number.
+    """
+    lines, integers, floats = array("q"), array("q"), array("d")
+    width = ids + numbers
+    for line, words in source:
+        if len(words) != width:
+            raise InputError(f"{path}:{line}: {len(words)} values where there must be {width}: {layout}")
+        try:
+            integers.extend(map(int, words[:ids]))
+            floats.extend(map(float, words[ids:]))
+        except (ValueError, OverflowError):
+            raise InputError(f"{path}:{line}: {_culprit(words, ids)}; a line holds {layout}") from None
+        lines.append(line)
+    return Table(
+        path,
+        np.array(lines, dtype=np.int64),
+        np.array(integers, dtype=np.int64).reshape(len(lines), ids),
+        np.array(floats, dtype=np.float64).reshape(len(lines), numbers),
+    )
+
+
+def shown(word: str) -> str:
+    """A word of a file as it may stand in a message, whatever it holds."""
+    return repr(word if len(word) <= 24 else f"{word[:24]}...")
+
+
+def _culprit(words: list[str], ids: int) -> str:
+    for k, word in enumerate(words):
+        try:
+            if k < ids:
+                array("q", [int(word)])
+            else:
+                float(word)
+        except (ValueError, OverflowError):
+            return f"{shown(word)} is not {'a camera id' if k < ids else 'a number'}"
+    raise AssertionError("every word was readable")

@@ -1,0 +1,82 @@
+"""Graphs as NumPy archives."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import InputError
+from bench.formats.graph import GraphFile, Ids, build, first
+
+_MOST_CAMERAS = 10_000_000  # so that a damaged number does not take all memory
+
+
+def read_npz(path: Path) -> GraphFile:
+    """Read a graph from a NumPy archive.
+
+    It holds ``edges`` (m, 2), ``rotations`` (m, 3, 3) = R_i R_j^T and, if wanted, ``weights`` (m,) and ``n``.
+    Cameras are 0 to n - 1; without ``n``, those that ``edges`` names. Nothing is unpickled.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the array, and the row (from 0) where one is at fault.
+    """
+    arrays = _load(path)
+    edges = _checked(path, "edges", arrays["edges"], "iu", (-1, 2)).astype(np.int64)
+    m = len(edges)
+    rotations = _checked(path, "rotations", arrays["rotations"], "iuf", (m, 3, 3)).astype(np.float64)
+    weights = _weights(path, arrays["weights"], m) if "weights" in arrays else None
+    cameras = _cameras(path, arrays["n"], edges) if "n" in arrays else None
+    if m == 0:
+        raise InputError(f"{path}: 'edges' is empty")
+    return build(edges, rotations, lambda row: f"{path}: row {row}", cameras=cameras, weights=weights)
+
+
+def _load(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            arrays = {
+                name: archive[name] for name in ("edges", "rotations", "weights", "n") if name in archive
+            }
+    except Exception as error:  # a damaged zip or header may fail in any of a dozen ways
+        raise InputError(
+            f"{path}: cannot be read as a NumPy archive of plain arrays; write it with numpy.savez"
+        ) from error
+    for name, shape in (("edges", "(m, 2)"), ("rotations", "(m, 3, 3)")):
+        if name not in arrays:
+            raise InputError(f"{path}: there is no array '{name}' in it; it must hold one of shape {shape}")
+    return arrays
+
+
+def _checked(path: Path, name: str, array: NDArray[Any], kinds: str, shape: tuple[int, ...]) -> NDArray[Any]:
+    """`array`, if of one of these dtype kinds and of this shape, where -1 is any length."""
+    numbers = "numbers" if "f" in kinds else "whole numbers"
+    if array.dtype.kind not in kinds:
+        raise InputError(f"{path}: '{name}' holds {array.dtype}; it must hold {numbers}")
+    if array.ndim != len(shape) or any(
+        want not in (-1, has) for want, has in zip(shape, array.shape, strict=True)
+    ):
+        raise InputError(
+            f"{path}: '{name}' must have shape {str(shape).replace('-1', 'm')}, not {array.shape}"
+        )
+    return array
+
+
+def _weights(path: Path, array: NDArray[Any], m: int) -> NDArray[np.float64]:
+    weights = _checked(path, "weights", array, "iuf", (m,)).astype(np.float64)
+    if (row := first(~(np.isfinite(weights) & (weights > 0)))) is not None:
+        raise InputError(
+            f"{path}: row {row}: the weight is {weights[row]:g}; weights must be positive numbers"
+        )
+    return weights
+
+
+def _cameras(path: Path, array: NDArray[Any], edges: Ids) -> Ids:
+    n = int(_checked(path, "n", array, "iu", ()))
+    if not 0 < n <= _MOST_CAMERAS:
+        raise InputError(f"{path}: 'n' is {n}, but must be from 1 to {_MOST_CAMERAS}")
+    if (row := first((edges >= n).any(axis=1))) is not None:
+        raise InputError(f"{path}: row {row}: camera {edges[row].max()} is outside the graph; 'n' is {n}")
+    return np.arange(n, dtype=np.int64)

@@ -1,0 +1,35 @@
+"""From a scored run to files: every table format and every figure."""
+
+from pathlib import Path
+
+from bench.reporting import tables
+from bench.results import Results
+
+EXTENSIONS = {"console": "txt", "markdown": "md", "csv": "csv", "latex": "tex"}
+
+
+def render_table(results: Results, style: str, *, width: int = 100, terminal: bool = False) -> tuple[str, tuple[str, ...]]:
+    """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render`."""
+    return tables.render(
+        results.frame, results.ties, results.footnotes, style, width=width, terminal=terminal
+    )
+
+
+def write_tables(results: Results, folder: Path) -> list[Path]:
+    """Write the table in every format to ``folder/tables``."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for style, extension in EXTENSIONS.items():
+        path = folder / f"table-{results.alignment}.{extension}"
+        path.write_text(render_table(results, style)[0], encoding="utf-8")
+        written.append(path)
+    return written
+
+
+def write_plots(results: Results, folder: Path) -> list[Path]:
+    """Draw every figure that the run has data for, as PNG, PDF and SVG."""
+    from bench.reporting import plots
+
+    folder.mkdir(parents=True, exist_ok=True)
+    figures = plots.figures(results.frame, results.errors)
+    return [path for name, figure in figures.items() for path in plots.save(figure, folder, name)]

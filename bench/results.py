@@ -1,0 +1,138 @@
+"""Score what a run has stored: the table of rows, the per-camera errors behind it, ties and footnotes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bench import selection
+from bench.execution import outcome
+from bench.problem import Floats, Instance
+from bench.scoring.errors import camera_errors, edge_metrics, summary
+from bench.scoring.statistics import tie_groups
+from bench.store import Job, Store
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Place = tuple[str, str, str]  # dataset, instance, protocol
+Configured = tuple[str, str]  # method, params
+
+
+@dataclass(frozen=True)
+class Results:
+    """A scored run.
+
+    Parameters
+    ----------
+    frame
+        One row for each (instance, method, parameters, seed) that was planned, whatever became of it.
+    errors
+        For each place and each configured method, its per-camera errors (n,) in degrees, one array a seed.
+    ties
+        For each place, the configured methods that cannot be told apart from the best.
+    footnotes
+        What a reader must know: notes on instances, and data that were not found.
+    alignment
+        The rule that removed the gauge.
+    """
+
+    frame: "pd.DataFrame"
+    errors: Mapping[Place, Mapping[Configured, tuple[Floats, ...]]]
+    ties: Mapping[Place, set[Configured]]
+    footnotes: tuple[str, ...]
+    alignment: str
+
+
+@dataclass
+class _Collected:
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    errors: dict[Place, dict[Configured, list[Floats]]] = field(default_factory=dict)
+    instances_of: dict[Place, set[str]] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
+
+
+def score(store: Store, rule: str = "l1", protocol: str | None = None) -> Results:
+    """Score every job that was ever planned in a store; nothing is run.
+
+    Parameters
+    ----------
+    store
+        The run.
+    rule
+        One of `bench.scoring.alignment.RULES`.
+    protocol
+        Keep the instances of one protocol only, and those of datasets that have none.
+    """
+    import pandas as pd
+
+    collected = _Collected()
+    instances: dict[str, Instance] = {}
+    for job in store.jobs():
+        key = job.instance_key
+        if key not in instances:
+            instances[key] = store.instance(key)
+        if protocol in (None, instances[key].protocol) or instances[key].protocol == "all":
+            _collect(collected, store, job, instances[key], rule)
+    plans = store.plans()
+    footnotes = [*collected.notes, *(plans[-1].missing if plans else ())]
+    ties = {
+        place: tie_groups(
+            {method: _stacked(errors) for method, errors in by_method.items()},
+            same_cameras=len(collected.instances_of[place]) == 1,
+        )
+        for place, by_method in collected.errors.items()
+    }
+    errors = {place: {m: tuple(e) for m, e in by_method.items()} for place, by_method in collected.errors.items()}
+    return Results(pd.DataFrame(collected.rows), errors, ties, tuple(footnotes), rule)
+
+
+def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, rule: str) -> None:
+    dataset = selection.parse(job.dataset).name
+    place = (dataset, job.instance, instance.protocol)
+    method = (job.method, selection.format_parameters(dict(job.parameters)))
+    collected.instances_of.setdefault(place, set()).add(job.instance_key)
+    collected.notes |= {f"{dataset}/{job.instance}: {note}": None for note in instance.notes}
+
+    record = store.record(job.id) or {"outcome": outcome.NOT_RUN, "status": outcome.NOT_RUN}
+    errors = np.full(instance.problem.n, np.nan)
+    scores: dict[str, Any] = {"n_solved": 0}
+    if record["outcome"] == outcome.OK:
+        rotations = store.estimate(job.id).rotations
+        scores["n_solved"] = int(np.isfinite(rotations).all(axis=(1, 2)).sum())
+        scores |= edge_metrics(instance.problem, rotations, instance.truth)
+        if instance.truth is not None:
+            errors = camera_errors(rotations, instance.truth, rule)
+            collected.errors.setdefault(place, {}).setdefault(method, []).append(errors)
+    collected.rows.append(
+        {
+            "dataset": dataset,
+            "instance": job.instance,
+            "method": job.method,
+            "title": job.title,
+            "params": method[1],
+            "seed": job.seed,
+            "protocol": instance.protocol,
+            "alignment": rule,
+            "status": record["status"],
+            **summary(errors),
+            "solve_s": record.get("solve_s"),
+            "peak_mib": record.get("peak_mib"),
+            "n_cameras": instance.problem.n,
+            "n_edges": instance.problem.m,
+            **scores,
+            **{name: instance.statistics.get(name) for name in ("edges_percent", "hardness")},
+            **{name: record.get(name) for name in ("iterations", "stop_reason", "cost", "certificate")},
+            "notes": "; ".join(record.get("notes", ())),
+            "job": job.id,
+        }
+    )
+
+
+def _stacked(errors: list[Floats]) -> Floats:
+    """(seeds, cameras), padded with NaN where the instances of the seeds differ in size."""
+    out = np.full((len(errors), max(len(e) for e in errors)), np.nan)
+    for row, e in zip(out, errors, strict=True):
+        row[: len(e)] = e
+    return out

@@ -1,0 +1,145 @@
+"""Run an experiment into a store: plan, prepare the instances, run what is not done."""
+
+import contextlib
+import os
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from bench import experiment, registry
+from bench.errors import InputError
+from bench.execution import outcome
+from bench.execution.local import Finished, LocalEngine
+from bench.execution.supervise import Limits
+from bench.experiment import Cell, Experiment, Suite
+from bench.store import Plan, Store
+
+Rerun = Literal["never", "failed", "always"]
+RUNS_FOLDER = Path("results", "runs")
+
+
+@dataclass(frozen=True)
+class Options:
+    """What `run` takes besides the suite; None means as the suite says.
+
+    Parameters
+    ----------
+    out
+        Folder of the run; by default ``results/runs/<suite>``.
+    data_dir
+        Where data are looked for first.
+    seeds, timeout_s, memory_gib
+        Override the suite's.
+    jobs, threads
+        How many jobs at a time, and how many threads the numerical libraries of each may use.
+    protocol
+        Override the protocol of every dataset that has one.
+    rerun
+        Which jobs with a record are run again. "never" still repeats those that ended at a lower limit than
+        today's, and those whose package was not installed.
+    plugins
+        Files with more methods and datasets; when no methods are named, their methods join the suite's.
+    """
+
+    out: Path | None = None
+    data_dir: Path | None = None
+    seeds: int | None = None
+    jobs: int | None = None
+    threads: int = 1
+    timeout_s: float | None = None
+    memory_gib: float | None = None
+    protocol: str | None = None
+    rerun: Rerun = "never"
+    plugins: tuple[Path, ...] = ()
+
+
+class Run:
+    """A run that has been planned: what there is to do, and how to do it.
+
+    Raises
+    ------
+    InputError
+        On anything that the user has to change; nothing is written then.
+    """
+
+    def __init__(
+        self, suite: str | None, methods: Sequence[str] = (), datasets: Sequence[str] = (), options: Options | None = None
+    ) -> None:
+        self.options = options = options or Options()
+        self.experiment = _resolved(suite, methods, datasets, options)
+        if not self.experiment.cells:
+            raise InputError("there is nothing to run: " + "; ".join(self.experiment.missing))
+        self.store = Store(options.out or RUNS_FOLDER / self.experiment.suite.name)
+        self.limits = Limits(self.experiment.suite.timeout_s, self.experiment.suite.memory_gib)
+        self.todo = [cell for cell in self.cells if not self._done(cell)]
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """Every cell of the experiment."""
+        return self.experiment.cells
+
+    def _done(self, cell: Cell) -> bool:
+        if self.options.rerun == "always":
+            return False
+        record = self.store.record(cell.job.id)
+        if record is None or record["outcome"] == outcome.NOT_INSTALLED:
+            return False
+        if self.options.rerun == "failed":
+            return record["outcome"] in (outcome.OK, outcome.SKIPPED)
+        hit = {outcome.TIMEOUT: "seconds", outcome.OUT_OF_MEMORY: "memory_gib"}.get(record["outcome"])
+        return hit is None or record["limits"][hit] >= getattr(self.limits, hit)
+
+    def prepare(self, tell: Callable[[str], None] = lambda _: None) -> None:
+        """Load the instances that are not stored yet, then keep the plan.
+
+        Raises
+        ------
+        InputError
+            Where data are malformed; no plan is kept then.
+        """
+        for cell in self.cells:
+            if not self.store.problem_path(cell.job.instance_key).exists():
+                tell(f"loading {cell.job.dataset} {cell.job.instance}")
+                self.store.add_instance(cell.job.instance_key, cell.source.load())
+        command = shlex.join(["python", "-m", "bench", *sys.argv[1:]])
+        jobs = tuple(cell.job for cell in self.cells)
+        self.store.add_plan(Plan(self.experiment.suite.name, jobs, self.experiment.missing, command))
+
+    def execute(self) -> Iterator[Finished]:
+        """Run what is not done; yield each cell with its record as it is stored."""
+        workers = self.options.jobs or os.cpu_count() or 1
+        engine = LocalEngine(self.store, self.limits, workers, self.options.threads)
+        with contextlib.closing(engine.run(self.todo)) as finished:
+            yield from finished
+
+
+def _resolved(suite_name: str | None, methods: Sequence[str], datasets: Sequence[str], options: Options) -> Experiment:
+    suite = experiment.load_suite(suite_name or experiment.DEFAULT_SUITE)
+    known_methods = registry.catalog("method", options.plugins)
+    known_datasets = registry.catalog("dataset", options.plugins)
+    own = [str(Path(path).resolve()) for path in options.plugins]
+    plugged_in = [info.name for info in known_methods if info.origin in own]
+    changes: dict[str, Any] = {
+        "methods": experiment.narrowed(suite.methods, methods) if methods else (*suite.methods, *plugged_in),
+        "seeds": options.seeds,
+        "timeout_s": options.timeout_s,
+        "memory_gib": options.memory_gib,
+    }
+    if datasets:
+        changes["datasets"] = experiment.narrowed(suite.datasets, datasets)
+    if methods and datasets and suite_name is None:
+        changes["name"] = "custom"
+    suite = replace(suite, **{key: value for key, value in changes.items() if value is not None})
+    _check_positive(suite)
+    return experiment.resolve(
+        suite, known_methods, known_datasets, data_dir=options.data_dir, protocol=options.protocol
+    )
+
+
+def _check_positive(suite: Suite) -> None:
+    for name in ("seeds", "timeout_s", "memory_gib"):
+        if getattr(suite, name) <= 0:
+            raise InputError(f"{name} must be above zero, not {getattr(suite, name):g}")

@@ -1,0 +1,126 @@
+"""Pose graphs of robotics: rotations between poses of one moving body."""
+
+import importlib.util
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bench.errors import InputError
+from bench.formats.pose_graph import read_pose_graph
+from bench.problem import Floats, Instance, Problem
+from bench.registry import Missing, Source, dataset, suggestion
+
+from ._folders import revision, roots
+from ._statistics import statistics
+
+SPHERE = "sphere2500"
+FOLDER = "pose_graphs"
+
+
+@dataset("pose-graph", title="Pose graphs")
+@dataclass(frozen=True)
+class PoseGraph:
+    """One pose graph: sphere2500 with its ground truth, or any g2o file without one.
+
+    Parameters
+    ----------
+    graph
+        ``sphere2500`` (Kaess et al., simulated; 2500 poses, 4949 edges) comes inside GTSAM's wheel, with
+        its noise-free edges. Any other name is that of ``<name>.g2o`` in the data folder, or in
+        ``pose_graphs/`` below it.
+    """
+
+    graph: str = SPHERE
+
+    def __post_init__(self) -> None:
+        if not self.graph or Path(self.graph).name != self.graph:
+            raise ValueError(f"graph is a name without folders and without .g2o, not '{self.graph}'")
+
+    def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source | Missing]:
+        """The graph, or what to do to get it.
+
+        Raises
+        ------
+        InputError
+            On a data folder that does not exist.
+        """
+        yield self._sphere() if self.graph == SPHERE else self._file(data_dir)
+
+    def _sphere(self) -> Source | Missing:
+        folder = _gtsam_data()
+        measured, noise_free = folder / f"{SPHERE}.txt", folder / f"{SPHERE}_groundtruth.txt"
+        if not (measured.is_file() and noise_free.is_file()):
+            return Missing(SPHERE, "python -m pip install 'gtsam>=4.3'")
+        identity = revision([measured, noise_free])
+        return Source(SPHERE, identity, lambda: _load_sphere(measured, noise_free, identity))
+
+    def _file(self, data_dir: Path | None) -> Source | Missing:
+        folders = [folder for root in roots(data_dir) for folder in (root, root / FOLDER)]
+        paths = [folder / f"{self.graph}.g2o" for folder in folders]
+        path = next((path for path in paths if path.is_file()), None)
+        if path is not None:
+            identity = revision([path])
+            return Source(self.graph, identity, lambda: _load_file(path, identity))
+        names = {SPHERE, *(other.stem for folder in folders for other in folder.glob("*.g2o"))}
+        where = f"put {self.graph}.g2o in {folders[0]} or name its folder with --data-dir"
+        return Missing(self.graph, f"{where}{suggestion(self.graph, names)}")
+
+
+def propagated(problem: Problem) -> Floats:
+    """Rotations (n, 3, 3) of a connected, noise-free graph, chained along a breadth-first tree.
+
+    Raises
+    ------
+    InputError
+        Where the graph is not connected.
+    """
+    from scipy.sparse.csgraph import breadth_first_order
+
+    if problem.components.any():
+        raise InputError("rotations cannot be propagated over a graph that is not connected")
+    order, parent = breadth_first_order(problem.adjacency(), 0, directed=False)
+    measured = {(int(i), int(j)): r for (i, j), r in zip(problem.edges, problem.rotations, strict=True)}
+    rotations = np.empty((problem.n, 3, 3))
+    rotations[0] = np.eye(3)
+    for camera in order[1:].tolist():
+        from_ = int(parent[camera])
+        step = measured[camera, from_] if camera < from_ else measured[from_, camera].T
+        rotations[camera] = step @ rotations[from_]
+    return rotations
+
+
+def _gtsam_data() -> Path:
+    """The folder of graphs inside the installed GTSAM, found without importing it; it need not exist."""
+    spec = importlib.util.find_spec("gtsam")
+    places = spec.submodule_search_locations if spec else None
+    return Path(places[0]) / "Data" if places else Path("gtsam-is-not-installed")
+
+
+def _load_sphere(measured: Path, noise_free: Path, identity: str) -> Instance:
+    problem = read_pose_graph(measured).problem
+    return Instance(
+        problem,
+        propagated(read_pose_graph(noise_free).problem),
+        name=SPHERE,
+        source="GTSAM's Data folder: sphere2500.txt, truth from sphere2500_groundtruth.txt",
+        revision=identity,
+        statistics=statistics(problem),
+    )
+
+
+def _load_file(path: Path, identity: str) -> Instance:
+    graph = read_pose_graph(path)
+    return Instance(
+        graph.problem,
+        None,
+        name=path.stem,
+        source=path.name,
+        revision=identity,
+        notes=(
+            *graph.notes,
+            "no ground truth (vertices are initial guesses): not scored, cost and time only",
+        ),
+        statistics=statistics(graph.problem),
+    )

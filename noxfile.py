@@ -1,0 +1,34 @@
+"""Sessions for development: ``nox`` runs tests, lint and types; ``nox -s demo`` runs the quick suite."""
+
+import nox
+
+nox.options.sessions = ["tests", "lint", "types"]
+
+
+@nox.session
+def tests(session: nox.Session) -> None:
+    """Run the test suite on both cores; arguments go to pytest."""
+    session.install("-e", ".[colmap,test]")
+    session.run("python", "-m", "pytest", "-n", "auto", *session.posargs)
+
+
+@nox.session
+def lint(session: nox.Session) -> None:
+    """Check style and format."""
+    session.install("ruff>=0.8")
+    session.run("ruff", "check", ".")
+    session.run("ruff", "format", "--check", ".")
+
+
+@nox.session
+def types(session: nox.Session) -> None:
+    """Check types, strictly."""
+    session.install("-e", ".[test]")
+    session.run("mypy", "bench")
+
+
+@nox.session
+def demo(session: nox.Session) -> None:
+    """Run the quick suite in a fresh environment, as a newcomer would."""
+    session.install("-e", ".[colmap]")
+    session.run("python", "-m", "bench", "run", *session.posargs)

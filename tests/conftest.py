@@ -1,0 +1,115 @@
+"""Fixtures that several test files use."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+# Before any numerical library is imported: the tests run on all cores already, one process each.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+REAL_DATA = Path(__file__).parent.parent.parent / "shared" / "data"
+
+
+@pytest.fixture
+def real_data() -> Path:
+    """Folder of the real scenes; the test is skipped where they are not on disk."""
+    if not REAL_DATA.is_dir():
+        pytest.skip("the real scenes are not on disk")
+    return REAL_DATA
+
+
+@pytest.fixture
+def faulty_plugin(tmp_path: Path) -> Path:
+    """A plug-in file with a method that fails in the way it is told to, and a small seeded dataset."""
+    path = tmp_path / "faulty.py"
+    path.write_text(FAULTY, encoding="utf-8")
+    return path
+
+
+FAULTY = '''
+"""A method that misbehaves on request."""
+import os, signal, sys, time
+from dataclasses import dataclass
+from pathlib import Path
+import numpy as np
+from bench import so3
+from bench.problem import Estimate, Instance, Problem, Skipped
+from bench.registry import Source, dataset, method
+from bench.seeds import stream
+
+
+@method("faulty", title="Faulty", deterministic=False)
+@dataclass(frozen=True)
+class Faulty:
+    """Identity rotations, or a fault."""
+    fault: str = "fine"
+    mark: str = ""
+
+    def solve(self, problem, rng):
+        if self.mark:
+            with open(self.mark, "a") as file:
+                file.write(f"{os.getpid()} {problem.n}\\n")
+        identity = np.tile(np.eye(3), (problem.n, 1, 1))
+        if self.fault == "segfault":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        elif self.fault == "hang":
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
+            if os.fork() == 0:
+                Path(self.mark).write_text(str(os.getpid()))
+            time.sleep(1000)
+        elif self.fault == "slow":
+            time.sleep(0.3)
+        elif self.fault == "orphan":
+            if os.fork() == 0:
+                Path(self.mark).write_text(str(os.getpid()))
+                time.sleep(1000)
+        elif self.fault == "memory":
+            kept = []
+            while True:
+                kept.append(np.ones(2_000_000))
+        elif self.fault == "exit":
+            os._exit(3)
+        elif self.fault == "raise":
+            raise KeyError("no such thing")
+        elif self.fault == "skip":
+            raise Skipped("not today")
+        elif self.fault == "shape":
+            return np.eye(3)
+        elif self.fault == "all-nan":
+            return np.full_like(identity, np.nan)
+        elif self.fault == "some-nan":
+            identity[0] = np.nan
+        elif self.fault == "scaled":
+            return 2 * identity
+        elif self.fault == "reflected":
+            return -identity
+        elif self.fault == "one-inf":
+            identity[1, 2, 2] = np.inf
+        elif self.fault == "write":
+            problem.rotations[0] = 0
+        elif self.fault == "noisy":
+            print("x" * 3_000_000)
+        elif self.fault == "weights":
+            return Estimate(identity, edge_weights=np.ones(1))
+        elif self.fault == "random":
+            return so3.random(rng, problem.n)
+        return identity
+
+
+@dataset("toy", title="Toy")
+@dataclass(frozen=True)
+class Toy:
+    """Complete noise-free graphs."""
+    n: int = 5
+
+    def sources(self, data_dir, seed):
+        def load():
+            truth = so3.random(stream(seed, "data", "toy"), self.n)
+            i, j = np.triu_indices(self.n, k=1)
+            problem = Problem(self.n, np.stack([i, j], axis=1), truth[i] @ np.swapaxes(truth[j], -1, -2))
+            return Instance(problem, truth, f"toy{self.n}", revision=f"{self.n}-{seed}")
+
+        yield Source(f"toy{self.n}", f"{self.n}-{seed}", load, seeded=True)
+'''

@@ -1,0 +1,228 @@
+"""The official archive's download, against a small archive of the same layout served on loopback."""
+
+import hashlib
+import io
+import re
+import tarfile
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+from bench.datasets._archive import Archive
+from bench.datasets.one_dsfm import FILES, OneDSfM
+from scenes import write_scene
+
+from bench.errors import InputError
+
+INSIDE = "home/wilsonkl/projects/SfM_Init/datasets"
+
+
+class Server(ThreadingHTTPServer):
+    """Serves `data` at every path, and misbehaves on request."""
+
+    data = b""
+    break_after: int | None = None
+    knows_range = True
+
+    def __init__(self) -> None:
+        super().__init__(("127.0.0.1", 0), Handler)
+        self.asked: list[str | None] = []
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.server_port}/datasets.tar.gz"
+
+    def archive(self) -> Archive:
+        return Archive(self.url, hashlib.sha256(self.data).hexdigest(), len(self.data))
+
+
+class Handler(BaseHTTPRequestHandler):
+    server: Server
+
+    def do_GET(self) -> None:
+        asked = self.headers.get("Range")
+        self.server.asked.append(asked)
+        start = int(asked[len("bytes=") : -1]) if asked and self.server.knows_range else 0
+        if start >= len(self.server.data):
+            self.send_error(416)
+            return
+        self.send_response(206 if start else 200)
+        self.send_header("Content-Length", str(len(self.server.data) - start))
+        self.end_headers()
+        self.wfile.write(self.server.data[start : self.server.break_after])
+
+    def log_message(self, format: str, *args: object) -> None:
+        pass
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    """A server of an archive with two scenes."""
+    for name, images in (("Alamo", 6), ("Ellis_Island", 8)):
+        write_scene(tmp_path / "scenes" / name, images)
+        for unwanted in ("coords.txt", "tracks.txt"):
+            (tmp_path / "scenes" / name / unwanted).write_text("large and not needed\n" * 500)
+    with Server() as server:
+        server.data = packed(tmp_path / "scenes")
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
+
+
+def packed(folder: Path, *extra: tarfile.TarInfo) -> bytes:
+    """The scenes of a folder in the layout of the official archive, and members that it should not have."""
+    file = io.BytesIO()
+    with tarfile.open(fileobj=file, mode="w:gz") as archive:
+        archive.add(folder, INSIDE)
+        for member in extra:
+            archive.addfile(member, io.BytesIO(b"x" * member.size))
+    return file.getvalue()
+
+
+def fetch(server: Server, folder: Path, archive: Archive | None = None) -> Path:
+    return OneDSfM().fetch(folder, archive=archive or server.archive(), progress=False)
+
+
+def refusal(server: Server, folder: Path, archive: Archive | None = None) -> str:
+    with pytest.raises(InputError) as caught:
+        fetch(server, folder, archive)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def tree(folder: Path) -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+def test_only_the_files_needed_are_unpacked(server: Server, tmp_path: Path) -> None:
+    scenes = fetch(server, tmp_path / "out")
+    expected = [f"1dsfm/{scene}/{name}" for scene in ("Alamo", "Ellis_Island") for name in FILES]
+    assert tree(tmp_path / "out") == sorted([*expected, "1dsfm/manifest.json"])
+    for name in FILES:
+        assert (scenes / "Alamo" / name).read_bytes() == (tmp_path / "scenes/Alamo" / name).read_bytes()
+    assert OneDSfM().verify(scenes) == [("Alamo", "ok"), ("Ellis_Island", "ok")]
+
+
+def test_what_is_there_is_not_fetched_again(server: Server, tmp_path: Path) -> None:
+    fetch(server, tmp_path / "out")
+    fetch(server, tmp_path / "out")
+    assert server.asked == [None]
+    (tmp_path / "out/1dsfm/Alamo/cc.txt").unlink()
+    fetch(server, tmp_path / "out")
+    assert server.asked == [None, None]
+    assert (tmp_path / "out/1dsfm/Alamo/cc.txt").is_file()
+
+
+def test_progress_is_shown(server: Server, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    OneDSfM().fetch(tmp_path / "out", archive=server.archive(), progress=True)
+    shown = capsys.readouterr().err
+    assert "100%" in shown
+    assert "unpack" in shown
+
+
+@pytest.mark.parametrize("knows_range", [True, False])
+def test_a_broken_download_is_resumed(server: Server, tmp_path: Path, knows_range: bool) -> None:
+    server.knows_range = knows_range
+    size, server.break_after = len(server.data), len(server.data) // 3
+    message = refusal(server, tmp_path / "out")
+    assert f"{server.break_after} of {size} bytes are here; the same command goes on" in message
+    assert tree(tmp_path / "out") == ["datasets.tar.gz.part"]
+    server.break_after = None
+    fetch(server, tmp_path / "out")
+    assert server.asked == [None, f"bytes={size // 3}-"]
+    assert OneDSfM().verify(tmp_path / "out") == [("Alamo", "ok"), ("Ellis_Island", "ok")]
+
+
+def test_a_wrong_checksum_is_refused_and_the_file_kept(server: Server, tmp_path: Path) -> None:
+    wrong = Archive(server.url, "0" * 64, len(server.data))
+    message = refusal(server, tmp_path / "out", wrong)
+    assert "its SHA-256 differs" in message
+    assert tree(tmp_path / "out") == ["datasets.tar.gz.bad"]
+    assert str(tmp_path / "out" / "datasets.tar.gz.bad") in message
+    fetch(server, tmp_path / "out")
+    assert server.asked == [None, None]
+
+
+def test_a_longer_file_is_refused(server: Server, tmp_path: Path) -> None:
+    shorter = Archive(server.url, server.archive().sha256, len(server.data) - 1)
+    assert "not the file expected" in refusal(server, tmp_path / "out", shorter)
+
+
+def test_a_file_that_is_shorter_on_the_server_is_given_up(server: Server, tmp_path: Path) -> None:
+    longer = Archive(server.url, server.archive().sha256, len(server.data) + 1)
+    assert "ended early" in refusal(server, tmp_path / "out", longer)
+    assert "the server holds fewer bytes" in refusal(server, tmp_path / "out", longer)
+    assert tree(tmp_path / "out") == ["datasets.tar.gz.bad"]
+
+
+def test_no_server(tmp_path: Path) -> None:
+    with Server() as server:
+        server.data = b"x"
+        archive = server.archive()
+    assert "goes on from there" in refusal(server, tmp_path / "out", archive)
+
+
+@pytest.mark.parametrize(
+    "name", ["../../evil/EGs.txt", "/tmp/evil/EGs.txt", f"{INSIDE}/../../x/cc.txt", "..\\a\\cc.txt"]
+)
+def test_a_path_out_of_the_archive_is_refused(server: Server, tmp_path: Path, name: str) -> None:
+    member = tarfile.TarInfo(name)
+    member.size = 3
+    server.data = packed(tmp_path / "scenes", member)
+    assert f"{name!r} lies outside the archive" in refusal(server, tmp_path / "out")
+    assert tree(tmp_path / "out") == ["datasets.tar.gz"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scenes"]
+
+
+@pytest.mark.parametrize("kind", [tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.FIFOTYPE])
+def test_a_link_in_place_of_a_file_is_refused(server: Server, tmp_path: Path, kind: bytes) -> None:
+    member = tarfile.TarInfo(f"{INSIDE}/Evil/EGs.txt")
+    member.type, member.linkname = kind, "/etc/hostname"
+    server.data = packed(tmp_path / "scenes", member)
+    assert "is not a plain file" in refusal(server, tmp_path / "out")
+    assert tree(tmp_path / "out") == ["datasets.tar.gz"]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
+def test_a_truncated_archive_leaves_nothing_half_unpacked(
+    server: Server, tmp_path: Path, share: float
+) -> None:
+    server.data = server.data[: int(share * len(server.data))]
+    assert "truncated or damaged" in refusal(server, tmp_path / "out")
+    assert tree(tmp_path / "out") == ["datasets.tar.gz"]
+
+
+@pytest.mark.parametrize("data", [b"not an archive", b"\x1f\x8b" + b"\0" * 50])
+def test_what_is_no_archive_is_refused(server: Server, tmp_path: Path, data: bytes) -> None:
+    server.data = data
+    assert "truncated or damaged" in refusal(server, tmp_path / "out")
+
+
+def test_an_archive_of_something_else_is_refused(server: Server, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "readme.txt").write_text("hello")
+    server.data = packed(tmp_path / "other")
+    assert "holds none of EGs.txt" in refusal(server, tmp_path / "out")
+    assert not (tmp_path / "out" / "1dsfm" / "manifest.json").exists()
+
+
+def test_a_folder_that_cannot_be_made(server: Server, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=re.escape(str(tmp_path / "file"))):
+        fetch(server, tmp_path / "file")
+
+
+def test_the_users_own_scenes_stay(server: Server, tmp_path: Path) -> None:
+    write_scene(tmp_path / "out/1dsfm/Mine", 5)
+    write_scene(tmp_path / "out/1dsfm/Alamo", 5)
+    (tmp_path / "out/1dsfm/Alamo/mine.txt").write_text("keep")
+    fetch(server, tmp_path / "out")
+    assert (tmp_path / "out/1dsfm/Alamo/mine.txt").read_text() == "keep"
+    assert (tmp_path / "out/1dsfm/Alamo/cc.txt").read_text() == (tmp_path / "scenes/Alamo/cc.txt").read_text()
+    (tmp_path / "out/1dsfm/Mine/list.txt").unlink()
+    fetch(server, tmp_path / "out")
+    assert len(server.asked) == 1

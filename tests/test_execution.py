@@ -1,0 +1,127 @@
+"""Supervised execution: however a method ends, its row says so, and nothing is left behind."""
+
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+
+from bench import registry
+from bench.execution import launch
+from bench.execution.single import Answer, SingleSolver
+from bench.execution.supervise import Limits
+from bench.problem import Problem
+
+LIMITS = Limits(seconds=30, memory_gib=1.0)
+
+
+def solve(plugin: Path, fault: str, limits: Limits = LIMITS, mark: str = "", seed: int = 0) -> Answer:
+    info = registry.catalog("method", [plugin])["faulty"]
+    problem = Problem(3, np.array([(0, 1), (0, 2), (1, 2)]), np.tile(np.eye(3), (3, 1, 1)))
+    with SingleSolver(info, {"fault": fault, "mark": mark}, limits) as solver:
+        return solver.solve(problem, seed)
+
+
+@pytest.mark.parametrize(
+    ("fault", "status"),
+    [
+        ("fine", "ok"),
+        ("some-nan", "ok"),
+        ("noisy", "ok"),
+        ("segfault", "crashed(SIGSEGV)"),
+        ("exit", "crashed(exit code 3)"),
+        ("raise", "error(KeyError: 'no such thing')"),
+        ("skip", "skipped(not today)"),
+        ("write", "error(ValueError: assignment destination is read-only)"),
+        ("shape", "invalid-output(rotations must be an array of shape (3, 3, 3), not (3, 3))"),
+        ("all-nan", "invalid-output(no camera was solved)"),
+        ("one-inf", "invalid-output(1 cameras have entries that are not finite)"),
+        ("scaled", "invalid-output(3 of 3 matrices are not rotations to 1e-06)"),
+        ("reflected", "invalid-output(3 of 3 matrices are not rotations to 1e-06)"),
+        ("weights", "invalid-output(edge_weights must have shape (3,), not (1,))"),
+    ],
+)
+def test_every_ending_has_its_row(faulty_plugin: Path, fault: str, status: str) -> None:
+    ended, report, estimate = solve(faulty_plugin, fault)
+    assert ended.text == status
+    assert (estimate is not None) == (status == "ok")
+    assert report["wall_s"] > 0
+
+
+def test_output_of_a_failed_child_is_kept(faulty_plugin: Path) -> None:
+    _, report, _ = solve(faulty_plugin, "raise")
+    assert "no such thing" in report["log"]
+    assert "Traceback" in report["log"]
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+def test_timeout_ends_a_child_that_ignores_term_and_its_grandchild(faulty_plugin: Path, tmp_path: Path) -> None:
+    mark = tmp_path / "grandchild"
+    ended, _, _ = solve(faulty_plugin, "hang", Limits(seconds=1.5, memory_gib=1), str(mark))
+    assert ended.text == "timeout(1.5 s)"
+    assert not is_running(int(mark.read_text()))
+
+
+def test_a_grandchild_does_not_outlive_a_child_that_ended_well(faulty_plugin: Path, tmp_path: Path) -> None:
+    mark = tmp_path / "grandchild"
+    ended, _, _ = solve(faulty_plugin, "orphan", mark=str(mark))
+    assert ended.text == "ok"
+    deadline = time.monotonic() + 5
+    while not mark.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not mark.exists() or not is_running(int(mark.read_text()))
+
+
+def test_memory_limit_is_on_resident_memory(faulty_plugin: Path) -> None:
+    ended, _, _ = solve(faulty_plugin, "memory", Limits(seconds=60, memory_gib=0.6))
+    assert ended.text == "out-of-memory(0.6 GiB)"
+
+
+def test_threads_are_pinned_in_the_child(faulty_plugin: Path) -> None:
+    _, report, _ = solve(faulty_plugin, "fine")
+    assert report["threads"] == 1
+
+
+def test_random_numbers_come_from_the_seed(faulty_plugin: Path) -> None:
+    first, again, other = (solve(faulty_plugin, "random", seed=seed)[2] for seed in (1, 1, 2))
+    assert first is not None
+    assert again is not None
+    assert other is not None
+    np.testing.assert_array_equal(first.rotations, again.rotations)
+    assert not np.array_equal(first.rotations, other.rotations)
+
+
+def test_without_fork_a_fresh_interpreter_does_the_same(faulty_plugin: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(launch, "CAN_FORK", False)
+    assert solve(faulty_plugin, "fine")[0].text == "ok"
+    assert solve(faulty_plugin, "segfault")[0].text == "crashed(SIGSEGV)"
+
+
+def test_a_server_that_dies_is_replaced(faulty_plugin: Path) -> None:
+    info = registry.catalog("method", [faulty_plugin])["faulty"]
+    problem = Problem(2, np.array([(0, 1)]), np.eye(3)[None])
+    with SingleSolver(info, {}, LIMITS) as solver:
+        assert solver.solve(problem)[0].text == "ok"
+        server = solver.launcher.servers[()]
+        os.kill(server.process.pid, 9)
+        server.reader.join(timeout=10)
+        assert solver.solve(problem)[0].text == "ok"
+
+
+def test_a_disconnected_graph_is_solved_on_its_largest_component(faulty_plugin: Path) -> None:
+    info = registry.catalog("method", [faulty_plugin])["faulty"]
+    problem = Problem(5, np.array([(0, 1), (2, 3), (2, 4)]), np.tile(np.eye(3), (3, 1, 1)))
+    with SingleSolver(info, {}, LIMITS) as solver:
+        _, report, estimate = solver.solve(problem)
+    assert estimate is not None
+    assert np.isnan(estimate.rotations[:2]).all()
+    assert np.isfinite(estimate.rotations[2:]).all()
+    assert report["notes"] == ["disconnected graph: solved on its largest component, 3 of 5 cameras"]

@@ -1,0 +1,112 @@
+"""Spanning trees and spectral synchronization: where they are exact, what they are invariant to, what they find."""
+
+import numpy as np
+import pytest
+from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
+
+from bench import so3
+from bench.methods._eigenspace import leading_eigenspace
+from bench.methods.spanning_tree import SpanningTree, tree_edges
+from bench.methods.spectral import Spectral, spectral_rotations
+from bench.problem import Floats, Ints, Problem
+
+RNG = np.random.default_rng(0)  # the methods here draw nothing from it
+COMPLETE = random_edges(120, 1.0)
+RANDOM = random_edges(150, 0.15)
+GRID = grid_edges(6, 30)
+RING = np.array([[k, k + 1] for k in range(299)] + [[0, 299]], dtype=np.int32)
+SMALL = random_edges(20, 0.3)
+EVERY_GRAPH = pytest.mark.parametrize(
+    "edges", [SMALL, RANDOM, COMPLETE, GRID, RING], ids=["small", "random", "complete", "grid", "ring"]
+)
+
+
+def weighted(problem: Problem, weights: Floats) -> Problem:
+    return Problem(problem.n, problem.edges, problem.rotations, weights)
+
+
+@EVERY_GRAPH
+@pytest.mark.parametrize("method", [SpanningTree(), Spectral(), Spectral(normalised=False)], ids=str)
+def test_noise_free_problems_are_solved_exactly(method: Spectral | SpanningTree, edges: Ints) -> None:
+    problem, truth = simulated(edges)
+    assert errors_deg(method.solve(problem, RNG).rotations, truth).max() < 1e-8
+
+
+@EVERY_GRAPH
+@pytest.mark.parametrize("method", [SpanningTree(), Spectral(), Spectral(normalised=False)], ids=str)
+def test_labels_and_edge_order_do_not_matter(method: Spectral | SpanningTree, edges: Ints) -> None:
+    problem, _ = simulated(edges, noise_deg=5, outliers=0.1)
+    other, order = transformed(problem)
+    first, second = method.solve(problem, RNG).rotations, method.solve(other, RNG).rotations
+    assert errors_deg(second, first[order]).max() < 1e-6
+
+
+def test_a_breadth_first_tree_has_shortest_paths_from_the_hub() -> None:
+    edges = np.array([[0, 1], [0, 2], [0, 3], [1, 4], [2, 4], [2, 5], [4, 6]], dtype=np.int32)
+    problem, _ = simulated(edges, noise_deg=5)
+    # Camera 4 hangs from 2 (three edges), not from 1 (two edges): edge 3 is left out. Hubs 0, 2 and 4 tie.
+    trees = {0: [0, 1, 2, 4, 5, 6], 2: [0, 1, 2, 4, 5, 6], 4: [1, 2, 3, 4, 5, 6]}
+    angles = so3.angle(problem.rotations)
+    hub = min(trees, key=lambda camera: angles[(edges == camera).any(axis=1)].sum())
+    assert sorted(tree_edges(problem, None)) == trees[hub]
+
+
+def test_a_tree_fits_its_own_edges() -> None:
+    problem, _ = simulated(RANDOM, noise_deg=5, outliers=0.3)
+    estimate = SpanningTree().solve(problem, RNG)
+    assert estimate.edge_weights is not None
+    chosen = estimate.edge_weights == 1
+    residuals = problem.residuals(estimate.rotations)
+    assert chosen.sum() == problem.n - 1
+    assert residuals[chosen].max() < 1e-12
+    assert residuals[~chosen].max() > 0.1
+
+
+def test_weights_choose_the_heaviest_tree() -> None:
+    edges = np.array([[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]], dtype=np.int32)
+    problem, _ = simulated(edges, noise_deg=5)
+    assert sorted(tree_edges(problem, np.array([5.0, 1.0, 4.0, 2.0, 3.0]))) == [0, 2, 4]
+
+
+def test_equal_weights_leave_the_tree_independent_of_labels() -> None:
+    problem, _ = simulated(RANDOM, noise_deg=5)
+    problem = weighted(problem, np.random.default_rng(1).integers(1, 4, problem.m).astype(float))
+    other, order = transformed(problem)
+    first, second = SpanningTree().solve(problem, RNG).rotations, SpanningTree().solve(other, RNG).rotations
+    assert errors_deg(second, first[order]).max() < 1e-6
+
+
+@pytest.mark.parametrize("normalised", [True, False])
+@EVERY_GRAPH
+def test_spectral_agrees_with_a_dense_eigensolver(edges: Ints, normalised: bool) -> None:
+    problem, _ = simulated(edges, noise_deg=10, outliers=0.05, seed=2)
+    matrix = problem.block_matrix(diagonal=np.ones(problem.n)).toarray()
+    if normalised:
+        scale = np.repeat((problem.degree + 1.0) ** -0.5, 3)
+        matrix *= scale[:, None] * scale
+    reference = np.linalg.eigh(matrix)[1][:, -3:]
+    found = spectral_rotations(problem, normalised=normalised)[1].vectors
+    np.testing.assert_allclose(np.linalg.svd(reference.T @ found)[1], 1, atol=1e-12)
+
+
+@pytest.mark.parametrize("edges", [SMALL, RANDOM, GRID], ids=["small", "random", "grid"])
+def test_edge_weights_silence_outliers(edges: Ints) -> None:
+    problem, truth = simulated(edges)
+    rotations = np.array(problem.rotations)
+    weights = np.full(problem.m, 7.0)
+    weights[1::5] = 1e-9
+    weights[edges[:, 1] == edges[:, 0] + 1] = 7.0
+    rotations[weights < 1] = so3.random(np.random.default_rng(4), int((weights < 1).sum()))
+    corrupted = Problem(problem.n, edges, rotations)
+    assert errors_deg(spectral_rotations(corrupted, weights)[0], truth).max() < 1e-4
+    assert errors_deg(spectral_rotations(corrupted)[0], truth).max() > 1
+
+
+def test_the_eigensolver_finds_a_triple_eigenvalue_and_says_when_it_cannot() -> None:
+    start = np.random.default_rng(0).standard_normal((400, 3))
+    triple = np.concatenate([np.linspace(-1, 0.9, 397), np.ones(3)])[:, None]
+    found = leading_eigenspace(lambda x: triple * x, start, 1e-9)
+    assert found.error <= 1e-9
+    assert np.abs(found.vectors[:397]).max() < 1e-8
+    fourfold = np.concatenate([np.linspace(-1, 0.9, 396), np.ones(4)])[:, None]
+    assert leading_eigenspace(lambda x: fourfold * x, start, 1e-9, most_products=90).error > 1e-9

@@ -1,0 +1,152 @@
+"""Plans, resume and identity: finished work is never lost, repeated or confused."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.errors import InputError
+from bench.results import score
+from bench.runner import Options, Run
+from bench.store import Store
+
+
+def planned(plugin: Path, out: Path, methods: list[str], datasets: list[str] | None = None, **options: object) -> Run:
+    settings = {"out": out, "plugins": (plugin,), "timeout_s": 30.0, "jobs": 2} | options
+    return Run("quick", methods, datasets or ["toy[n=[3,4]]"], Options(**settings))  # type: ignore[arg-type]
+
+
+def finish(run: Run) -> list[str]:
+    run.prepare()
+    return [record["status"] for _, record in run.execute()]
+
+
+def test_resume_runs_nothing_twice(faulty_plugin: Path, tmp_path: Path) -> None:
+    mark = tmp_path / "runs"
+    methods = [f"faulty[mark={mark}]"]
+    assert finish(planned(faulty_plugin, tmp_path / "run", methods)) == ["ok", "ok"]
+    assert finish(planned(faulty_plugin, tmp_path / "run", methods)) == []
+    assert len(mark.read_text().splitlines()) == 2
+
+
+def test_an_interrupted_run_continues_to_the_same_table(faulty_plugin: Path, tmp_path: Path) -> None:
+    methods = ["faulty[fault=[slow,random,raise]]"]
+    datasets = ["toy[n=[3,4,5]]"]
+    whole = planned(faulty_plugin, tmp_path / "whole", methods, datasets)
+    finish(whole)
+
+    broken = planned(faulty_plugin, tmp_path / "broken", methods, datasets)
+    broken.prepare()
+    execution = broken.execute()
+    done = [next(execution)[0].job.id, next(execution)[0].job.id]
+    execution.close()
+    assert not list((tmp_path / "broken" / "work").iterdir())
+
+    rest = planned(faulty_plugin, tmp_path / "broken", methods, datasets)
+    assert not set(done) & {cell.job.id for cell in rest.todo}
+    assert 0 < len(rest.todo) < 9
+    finish(rest)
+    timeless = [c for c in score(whole.store).frame.columns if c not in ("solve_s", "peak_mib")]
+    assert score(whole.store).frame[timeless].equals(score(rest.store).frame[timeless])
+
+
+def test_changing_a_method_s_source_runs_it_again_and_replaces_its_row(faulty_plugin: Path, tmp_path: Path) -> None:
+    run = planned(faulty_plugin, tmp_path / "run", ["faulty"], ["toy"])
+    finish(run)
+    edited = tmp_path / "edited" / faulty_plugin.name
+    edited.parent.mkdir()
+    edited.write_text(faulty_plugin.read_text() + "\n# edited\n")
+    again = planned(edited, tmp_path / "run", ["faulty"], ["toy"])
+    assert len(again.todo) == 1
+    finish(again)
+    assert len(score(run.store).frame) == 1
+
+
+def test_parameters_and_seeds_are_part_of_the_identity(faulty_plugin: Path, tmp_path: Path) -> None:
+    run = planned(faulty_plugin, tmp_path, ["faulty[fault=[fine,random]]"], seeds=3)
+    ids = {cell.job.id for cell in run.cells}
+    assert len(ids) == len(run.cells) == 2 * 2 * 3
+
+
+def test_failed_jobs_are_repeated_on_request_only(faulty_plugin: Path, tmp_path: Path) -> None:
+    methods = ["faulty[fault=[fine,raise]]"]
+    finish(planned(faulty_plugin, tmp_path, methods, ["toy"]))
+    assert planned(faulty_plugin, tmp_path, methods, ["toy"]).todo == []
+    assert len(planned(faulty_plugin, tmp_path, methods, ["toy"], rerun="failed").todo) == 1
+    assert len(planned(faulty_plugin, tmp_path, methods, ["toy"], rerun="always").todo) == 2
+
+
+def test_a_timeout_is_repeated_when_the_limit_is_raised(faulty_plugin: Path, tmp_path: Path) -> None:
+    mark = tmp_path / "grandchild"
+    methods = [f"faulty[fault=hang,mark={mark}]"]
+    assert finish(planned(faulty_plugin, tmp_path, methods, ["toy"], timeout_s=1.0)) == ["timeout(1 s)"]
+    assert planned(faulty_plugin, tmp_path, methods, ["toy"], timeout_s=1.0).todo == []
+    assert len(planned(faulty_plugin, tmp_path, methods, ["toy"], timeout_s=2.0).todo) == 1
+
+
+def test_an_unreadable_record_is_run_again(faulty_plugin: Path, tmp_path: Path) -> None:
+    run = planned(faulty_plugin, tmp_path, ["faulty"], ["toy"])
+    finish(run)
+    record = next((tmp_path / "records").iterdir())
+    record.write_text(record.read_text()[:40])
+    assert len(planned(faulty_plugin, tmp_path, ["faulty"], ["toy"]).todo) == 1
+
+
+def test_a_later_plan_adds_to_the_table(faulty_plugin: Path, tmp_path: Path) -> None:
+    finish(planned(faulty_plugin, tmp_path, ["faulty"], ["toy"]))
+    finish(planned(faulty_plugin, tmp_path, ["faulty[fault=raise]"], ["toy"]))
+    assert list(score(Store.open(tmp_path)).frame["status"]) == ["ok", "error(KeyError: 'no such thing')"]
+
+
+def test_what_was_planned_and_did_not_run_has_its_row(faulty_plugin: Path, tmp_path: Path) -> None:
+    run = planned(faulty_plugin, tmp_path, ["faulty"], ["toy"])
+    run.prepare()
+    assert list(score(run.store).frame["status"]) == ["not-run"]
+
+
+def test_the_child_is_never_given_the_truth(faulty_plugin: Path, tmp_path: Path) -> None:
+    run = planned(faulty_plugin, tmp_path, ["faulty"], ["toy"])
+    run.prepare()
+    with np.load(run.store.problem_path(run.cells[0].job.instance_key)) as data:
+        assert sorted(data) == ["edges", "n", "rotations"]
+
+
+def test_estimates_are_stored_unrounded(faulty_plugin: Path, tmp_path: Path) -> None:
+    run = planned(faulty_plugin, tmp_path, ["faulty[fault=random]"], ["toy"])
+    finish(run)
+    rotations = run.store.estimate(run.cells[0].job.id).rotations
+    assert rotations.dtype == np.float64
+    np.testing.assert_allclose(rotations @ rotations.transpose(0, 2, 1), np.tile(np.eye(3), (5, 1, 1)), atol=1e-14)
+
+
+def test_a_record_tells_where_it_comes_from(faulty_plugin: Path, tmp_path: Path) -> None:
+    run = planned(faulty_plugin, tmp_path, ["faulty"], ["toy"])
+    finish(run)
+    record = json.loads(next((tmp_path / "records").iterdir()).read_text())
+    assert record["schema"] == 1
+    assert record["job"]["seed"] == 0
+    assert {"numpy", "scipy"} <= set(record["versions"])
+    assert {"python", "cpu", "command", "git"} <= set(record["provenance"])
+    assert record["limits"] == {"seconds": 30.0, "memory_gib": 4}
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"seeds": 0}, "seeds must be above zero, not 0"),
+        ({"timeout_s": -1.0}, "timeout_s must be above zero, not -1"),
+        ({"plugins": (Path("nowhere.py"),)}, "--plugin nowhere.py: there is no such Python file"),
+    ],
+)
+def test_bad_options_are_one_sentence(
+    faulty_plugin: Path, tmp_path: Path, change: dict[str, object], sentence: str
+) -> None:
+    with pytest.raises(InputError, match=sentence):
+        planned(faulty_plugin, tmp_path / "run", ["faulty"], **change)
+    assert not (tmp_path / "run").exists()
+
+
+def test_opening_a_folder_that_is_no_run(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is not the folder of a run"):
+        Store.open(tmp_path)
