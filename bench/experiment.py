@@ -81,7 +81,11 @@ def load_suite(name: str) -> Suite:
         names = suite_names()
         if name not in names:
             raise InputError(f"there is no suite '{name}'{registry.suggestion(name, names)}")
-        text, where, stem = (resources.files("bench.suites") / f"{name}.toml").read_text(), f"suite {name}", name
+        text, where, stem = (
+            (resources.files("bench.suites") / f"{name}.toml").read_text(),
+            f"suite {name}",
+            name,
+        )
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -113,7 +117,7 @@ def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
 
 
 def narrowed(suite_selections: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
-    """Apply ``-m`` or ``-d`` to a suite's list: a bare name that the suite configures means the suite's configurations of it."""
+    """Apply ``-m`` or ``-d`` to a suite's list; a bare name stands for the configurations of it that the suite has."""
     out: list[str] = []
     for text in wanted:
         parsed = selection.parse(text)
@@ -171,8 +175,6 @@ def _cells_of(
         for method_seed in range(seeds) if repeated else (seed,):
             complete = parameters_of(info.configure(parameters))
             identity = digest([SCHEMA, key, info.name, complete, info.source_hash, method_seed])
-            job = Job(
-                identity, label, source.name, key, info.name, info.title, info.origin, parameters, method_seed
-            )
+            job = Job(identity, label, source.name, key, info.name, info.title, info.origin, parameters, method_seed)
             cells.append(Cell(job, source, info))
     return cells

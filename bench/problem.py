@@ -105,7 +105,7 @@ class Problem:
         return sparse.diags_array(adjacency.sum(axis=1)).tocsr() - adjacency
 
     def block_matrix(self, values: Floats | None = None, diagonal: Floats | None = None) -> "sparse.csr_array":
-        """Symmetric (3n, 3n) CSR matrix of the measurements: block (i, j) is values_ij R_ij, block (j, i) its transpose.
+        """Symmetric (3n, 3n) CSR matrix of the measurements: block (i, j) is R_ij times a value, (j, i) its transpose.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class Problem:
         """
         label = np.full(self.n, -1, dtype=np.int32)
         label[cameras] = np.arange(len(cameras), dtype=np.int32)
-        kept = (label[self.edges] >= 0).all(axis=1)
+        kept: NDArray[np.bool_] = np.all(label[self.edges] >= 0, axis=1)
         edges, rotations = oriented(label[self.edges[kept]], self.rotations[kept])
         weights = None if self.weights is None else self.weights[kept]
         return Problem(len(cameras), edges, rotations, weights), kept
@@ -241,7 +241,7 @@ class Estimate:
 
 
 def oriented(edges: NDArray[np.integer[Any]], rotations: Floats) -> tuple[Ints, Floats]:
-    """Edges (m, 2) with i < j and the rotations (m, 3, 3) that belong to them: transposed where an edge was reversed."""
+    """Edges (m, 2) with i < j, and their rotations (m, 3, 3): transposed where an edge had to be reversed."""
     reverse = edges[:, 0] > edges[:, 1]
     flipped = np.where(reverse[:, None], edges[:, ::-1], edges).astype(np.int32)
     return flipped, np.where(reverse[:, None, None], np.swapaxes(rotations, -1, -2), rotations)

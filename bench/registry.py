@@ -160,7 +160,7 @@ def method(
     name, title, cite
         Its id, its name in tables, and the key of its paper in ``methods/references.bib``.
     requires, install
-        Packages that `solve` imports, and the command that installs them where it is not ``pip install`` of their names.
+        Packages that `solve` imports, and the command that installs them where ``pip install`` of their names is not.
     supervised, uses_images
         The two columns of the founding paper's Table II.
     robust, certifies
@@ -168,7 +168,7 @@ def method(
     deterministic
         Whether the same problem always gives the same estimate, whatever the seed.
     max_cameras
-        The largest problem it is meant for; larger ones become ``skipped`` rows. A field of the same name overrides it.
+        The largest problem it is meant for; larger ones become ``skipped`` rows. A field of that name overrides it.
     exact_to_deg
         How closely it promises to recover small noise-free problems.
     invariant_to_deg
@@ -194,7 +194,7 @@ def dataset(
 ) -> Callable[[T], T]:
     """Declare a frozen dataclass with a `sources` method as a dataset.
 
-    A `fetchable` dataset has ``fetch(names, progress)`` and ``verify(data_dir)`` as well.
+    A `fetchable` dataset has ``fetch(folder)`` and ``verify(data_dir)`` as well.
     """
     return _declare("dataset", name, title, cite, requires, {"fetchable": fetchable}, "sources")
 
@@ -228,7 +228,7 @@ class Catalog:
         if name in self.entries:
             return self.entries[name]
         for origin, why in self.broken.items():
-            if Path(origin).stem.replace("_", "-") == name:
+            if origin.removesuffix(".py").replace("/", ".").split(".")[-1].replace("_", "-") == name:
                 raise InputError(f"{self.kind} '{name}' is broken: {why}")
         raise InputError(f"there is no {self.kind} '{name}'{suggestion(name, self.entries)}")
 
@@ -325,7 +325,9 @@ def _plugin_path(path: str | Path) -> str:
 
 def infos(module: types.ModuleType, kind: str) -> list[Info]:
     """Return the plug-ins of one kind that a module declares itself."""
-    classes = [value for value in vars(module).values() if isinstance(value, type) and value.__module__ == module.__name__]
+    classes = [
+        value for value in vars(module).values() if isinstance(value, type) and value.__module__ == module.__name__
+    ]
     infos = [cls.__dict__[_INFO] for cls in classes if _INFO in cls.__dict__]
     return [info for info in infos if info.kind == kind]
 

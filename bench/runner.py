@@ -66,7 +66,11 @@ class Run:
     """
 
     def __init__(
-        self, suite: str | None, methods: Sequence[str] = (), datasets: Sequence[str] = (), options: Options | None = None
+        self,
+        suite: str | None,
+        methods: Sequence[str] = (),
+        datasets: Sequence[str] = (),
+        options: Options | None = None,
     ) -> None:
         self.options = options = options or Options()
         self.experiment = _resolved(suite, methods, datasets, options)
@@ -117,6 +121,8 @@ class Run:
 
 
 def _resolved(suite_name: str | None, methods: Sequence[str], datasets: Sequence[str], options: Options) -> Experiment:
+    if options.data_dir is not None and not options.data_dir.is_dir():
+        raise InputError(f"--data-dir {options.data_dir}: there is no such folder")
     suite = experiment.load_suite(suite_name or experiment.DEFAULT_SUITE)
     known_methods = registry.catalog("method", options.plugins)
     known_datasets = registry.catalog("dataset", options.plugins)

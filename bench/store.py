@@ -128,7 +128,7 @@ class Store:
             return
         with self.work_folder() as work:
             save_problem(work / "problem.npz", instance.problem)
-            hidden = {"truth": instance.truth, "outliers": instance.outliers}
+            hidden: dict[str, Any] = {"truth": instance.truth, "outliers": instance.outliers}
             with (work / "truth.npz").open("wb") as file:
                 np.savez(file, **{name: value for name, value in hidden.items() if value is not None})
             facts = {f: getattr(instance, f) for f in ("name", "protocol", "source", "revision", "notes")}
@@ -149,8 +149,8 @@ class Store:
         """Read an instance back."""
         folder = self.folder / "instances" / key
         with np.load(folder / "truth.npz", allow_pickle=False) as data:
-            truth = data["truth"] if "truth" in data else None
-            outliers = data["outliers"] if "outliers" in data else None
+            truth = data.get("truth", None)
+            outliers = data.get("outliers", None)
         facts = _read_json(folder / "instance.json")
         facts["notes"] = tuple(facts["notes"])
         return Instance(load_problem(folder / "problem.npz"), truth, outliers=outliers, **facts)

@@ -1,14 +1,14 @@
-"""A checked, resumable download, and the unpacking of the few files that are needed."""
+"""A checked, resumable download, and the unpacking of the few files that are needed.
+
+What speaks HTTP and reads archives is imported where it is used, so that listing datasets stays quick.
+"""
 
 import gzip
 import hashlib
-import http.client
+import http
 import json
 import shutil
-import tarfile
 import tempfile
-import urllib.error
-import urllib.request
 import zlib
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -42,6 +42,9 @@ def download(archive: Archive, folder: Path, progress: bool) -> Path:
         Where the server cannot be reached or the connection breaks (what has arrived stays in ``*.part``),
         or where the file is not the one expected (it is kept as ``*.bad``).
     """
+    import http.client
+    import urllib.error
+
     path = folder / archive.url.rsplit("/", 1)[-1]
     if path.is_file() and _sha256(path) == archive.sha256:
         return path
@@ -77,6 +80,8 @@ def unpack(path: Path, archive: Archive, folder: Path, wanted: Collection[str], 
         Where the archive is truncated or damaged, holds none of these files or one of them as a link, or
         names any file by an absolute path or one with ``..``.
     """
+    import tarfile
+
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder, prefix=".unpacking-") as temporary:
         try:
@@ -115,6 +120,8 @@ def damaged(folder: Path, archive: Archive) -> dict[str, str]:
 
 
 def _receive(archive: Archive, part: Path, progress: bool) -> None:
+    import urllib.request
+
     from tqdm import tqdm
 
     have = part.stat().st_size if part.is_file() else 0
@@ -145,6 +152,8 @@ def _set_aside(part: Path, why: str) -> NoReturn:
 
 
 def _extract(path: Path, folder: Path, wanted: Collection[str], progress: bool) -> None:
+    import tarfile
+
     from tqdm import tqdm
 
     with (

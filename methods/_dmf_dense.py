@@ -1,5 +1,6 @@
-"""The dense form of deep matrix factorization: full layers, a random start near zero, as the paper trains it."""
+"""The dense form of deep matrix factorization: full layers and a random start near zero, as in the paper."""
 
+import itertools
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -13,10 +14,11 @@ SMALL = 150  # rows; up to here a full eigendecomposition is fastest
 
 
 class DenseFactorization:
-    """E = W_1 W_2 ... W_d, trained by stochastic-gradient steps (with the full batch) on the observed entries.
+    """E = W_1 W_2 ... W_d, trained by full-batch gradient steps on the observed entries.
 
-    The gradient of the mean loss with respect to E is known in closed form, and is passed through the product by explicit
-    matrix products that add to the momentum in place: 3 (d - 1) products an iteration, no graph of operations.
+    The gradient of the mean loss with respect to E is known in closed form. It is passed down the product
+    by explicit matrix products that add to the momentum in place: 3 (d - 1) products an iteration, no graph
+    of operations.
 
     Parameters
     ----------
@@ -25,8 +27,8 @@ class DenseFactorization:
     depth, width
         Number of layers, and rows and columns of the inner ones.
     init_scale
-        Entries of every layer are Gaussian, such that the expected squared Frobenius norm of E is init_scale^2 3n; with width 3n
-        their standard deviation is init_scale^(1/d) (3n)^(-1/2).
+        Entries of every layer are Gaussian, such that the expected squared Frobenius norm of E is
+        init_scale^2 3n; with width 3n their standard deviation is init_scale^(1/d) (3n)^(-1/2).
     seed
         Of the layers. They are drawn on the CPU, so that all devices start alike.
     device
@@ -42,7 +44,7 @@ class DenseFactorization:
         generator = torch.Generator().manual_seed(seed)
         deviation = (init_scale**2 / (size * float(width) ** (depth - 1))) ** (1 / (2 * depth))
         sizes = [size, *[width] * (depth - 1), size]
-        shapes = list(zip(sizes[:-1], sizes[1:], strict=True))
+        shapes = itertools.pairwise(sizes)
         layers = [deviation * torch.randn(shape, generator=generator) for shape in shapes]
         self.layers = [layer.to(device) for layer in layers]
         self._velocity = [torch.zeros_like(layer) for layer in self.layers]
@@ -75,7 +77,7 @@ class DenseFactorization:
         self.layers[0].sub_(self._velocity[0], alpha=lr)
 
     def evaluate(self, loss: Literal["l1", "l2"]) -> tuple[float, Floats, Floats]:
-        """Mean loss over the observed entries, and the four largest eigenvalues of the symmetric part of E with their eigenvectors.
+        """Mean loss over the observed entries, and the leading eigenpairs of the symmetric part of E.
 
         Returns
         -------

@@ -57,7 +57,7 @@ class Observed:
 
 @dataclass
 class Factors:
-    """A symmetric product D^(1/2) E D^(1/2) = W_d W_(d-1) ... W_1 whose last factor is the first one's transpose.
+    """A symmetric product D^(1/2) E D^(1/2) = W_d ... W_1 whose last factor is the transpose of the first.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Factors:
         return cls((vectors * root).astype(np.float32), middle)
 
     def partial_products(self) -> tuple[list[Single], list[Single]]:
-        """Products of the middle factors before each, and after each; the whole is the last and first of them."""
+        """Products of the middle factors before each, and after each; the last and the first are of all."""
         identity = np.eye(self.end.shape[1], dtype=np.float32)
         before, after = [identity], [identity]
         for factor in self.middle:
@@ -102,7 +102,7 @@ class Factors:
 
 
 def nearest_rotations(vectors: Floats) -> Floats:
-    """Rotations (n, 3, 3) nearest to the blocks of three columns (3n, 3), which are known up to one reflection."""
+    """Rotations (n, 3, 3) nearest to the blocks of three columns (3n, 3), known up to one reflection."""
     blocks = vectors.reshape(-1, 3, 3)
     if np.sign(np.linalg.det(blocks)).sum() < 0:
         blocks = blocks * [1.0, 1.0, -1.0]
@@ -122,15 +122,16 @@ def descend(
 ) -> float:
     """Gradient descent with momentum on the factors, in place; the step falls to zero along half a cosine.
 
-    With degree-normalised rows the gradient of one camera is an average over its neighbours. Divided by s^(1-2/d), s being the
-    number of observed blocks, a step then moves a rotation equally far in any graph at any depth.
+    With degree-normalised rows the gradient of one camera is an average over its neighbours. Divided by
+    k^(1-2/d), k being the number of observed blocks, a step then moves a rotation equally far in any graph
+    at any depth d.
 
     Parameters
     ----------
     lr
         First step, relative.
     smoothing
-        First and last scale of the smoothed loss "l1/2", chordal; it falls geometrically.
+        First and last scale s of the smoothed losses "l1" and "l1/2", chordal; it falls geometrically.
     report
         Called with the iteration and the loss before every step, and once after the last.
 
@@ -175,21 +176,23 @@ def descend(
 def edge_kernel(width: int, loss: Loss) -> Callable[..., float]:
     """Compile the loop over observed blocks for one width and one loss; kept on disk by numba.
 
-    The function takes (first, neighbour, blocks, left (n, 3w), right (3w, n), scale, sums (n, 3w)), fills ``sums`` with G @ right,
-    where G is the gradient of the loss with respect to E, and returns the mean loss. With the residual
-    r = left_i right_j^T - R_ij, the gradient block is sign(r) for "l1", r for "l2", and
-    sqrt(scale) (|r|^2 + scale^2)^(-3/4) r for "l1/2".
+    The function takes (first, neighbour, blocks, left (n, 3w), right (3w, n), s, sums (n, 3w)). It fills
+    ``sums`` with G @ right, where G is the gradient of the loss with respect to E, and returns the mean loss.
+    With the residual r = left_i right_j^T - R_ij, the block of G is r / (r^2 + s^2)^(1/2) entry by entry for
+    "l1", r for "l2", and s^(1/2) r / (|r|^2 + s^2)^(3/4) for "l1/2".
     """
     import numba
 
     size = 3 * width
 
-    @numba.njit(cache=True, fastmath=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
-    def kernel(first: Any, neighbour: Any, blocks: Any, left: Any, right: Any, scale: Any, sums: Any) -> float:
+    @numba.njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
+    def kernel(
+        first: Any, neighbour: Any, blocks: Any, left: Any, right: Any, scale: Any, sums: Any
+    ) -> float:
         near = np.empty((size, CHUNK), np.float32)
         residual = np.empty((9, CHUNK), np.float32)
         square = np.empty(CHUNK, np.float32)
-        total = 0.0
+        total = np.float64(0)
         for i in range(left.shape[0]):
             for q in range(size):
                 sums[i, q] = 0
@@ -238,4 +241,4 @@ def edge_kernel(width: int, loss: Loss) -> Callable[..., float]:
                         sums[i, row + c] += part
         return total / (len(neighbour) * (1 if loss == "l1/2" else 9))
 
-    return kernel  # type: ignore[no-any-return]
+    return kernel

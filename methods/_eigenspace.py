@@ -82,12 +82,11 @@ def leading_eigenspace(
 
 
 def _orthogonalised(image: Floats, basis: Floats, coefficients: Floats) -> tuple[Floats, Floats]:
-    """Split `image` into basis @ coefficients (filled) and following @ coupling, orthogonal to it."""
+    """Split `image` into basis @ coefficients (filled) and the rest: its directions, and its triangle."""
     coefficients[:] = basis.T @ image
     following, coupling = np.linalg.qr(image - basis @ coefficients)
     for _ in range(2):  # where a column was zero, only rounding is left after the first pass
-        following, correction = np.linalg.qr(following - basis @ (basis.T @ following))
-        coupling = correction @ coupling
+        following, _ = np.linalg.qr(following - basis @ (basis.T @ following))
     return following, coupling
 
 

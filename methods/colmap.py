@@ -19,20 +19,22 @@ from bench.registry import method
 )
 @dataclass(frozen=True)
 class Colmap:
-    """Minimises a sum of robust functions of geodesic residuals: an L1 stage, then iteratively reweighted least squares.
+    """Minimises a sum of robust functions of geodesic residuals: an L1 stage, then reweighted least squares.
 
     1. Start from a maximum spanning tree by match counts.
-    2. At most 5 linearised L1 steps by ADMM, then at most 100 reweighted ones; both end at a mean step of 1e-3.
+    2. At most 5 linearised L1 steps by ADMM, then at most 100 reweighted ones; both end at a mean step of
+       1e-3.
 
-    Source: the rotation averaging of GLOMAP (Pan et al. 2024), after Chatterjee and Govindu 2013, as it is in COLMAP 4.
-    The weights of a problem, where it has them, are the match counts; otherwise the edges count alike, and the order
-    of the edges decides between equal trees. COLMAP would drop edges and cameras after solving; that is off
-    (``max_rotation_error_deg = 0``), so that every camera is kept.
+    Source: the rotation averaging of GLOMAP (Pan et al. 2024), after Chatterjee and Govindu 2013, as it is
+    in COLMAP 4. The weights of a problem, where it has them, are the match counts; otherwise the edges count
+    alike, and the order of the edges decides between equal trees. COLMAP would drop edges and cameras after
+    solving; that is off (``max_rotation_error_deg = 0``), so that every camera is kept.
 
     Parameters
     ----------
     weight_type
-        ``geman-mcclure``, weights sigma^2 / (e^2 + sigma^2)^2; or ``half-norm``, e^(-3/2), whose factorization may fail.
+        ``geman-mcclure``, weights sigma^2 / (e^2 + sigma^2)^2; or ``half-norm``, e^(-3/2), whose
+        factorization may fail.
     sigma_deg
         Scale of Geman-McClure.
 
@@ -61,7 +63,8 @@ class Colmap:
         )
         if not solved:
             raise RuntimeError(
-                f"COLMAP's rotation averaging with weight_type={self.weight_type} reported failure, its poses are unusable"
+                f"COLMAP's rotation averaging with weight_type={self.weight_type} reported failure; "
+                "its poses are unusable"
             )
         return Estimate(_rotations(reconstruction, problem.n), stop_reason="COLMAP reported success")
 

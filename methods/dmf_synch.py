@@ -1,7 +1,7 @@
 """DMF-Synch: rotation synchronization by deep matrix factorization."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -9,44 +9,67 @@ import numpy as np
 from bench.problem import Checkpoint, Estimate, Floats, Problem
 from bench.registry import method
 
-from . import _dmf_dense, _dmf_thin
-from ._dmf_thin import Factors, Loss, Observed, nearest_rotations
-from .spectral import spectral_rotations
+from . import _dmf_dense, _dmf_thin, spectral
+from ._dmf_thin import Factors, Loss, Observed, Report, nearest_rotations
 
 START_TOLERANCE = 1e-3  # radians; the descent moves further than that
 EXTRA = 0.1  # size of the columns beyond three at a spectral start, relative to a rotation's
 WIDE = 8  # width of the run that replaces the spectral start
 WIDE_LR = 0.1  # its step, relative to the main run's
 FIRST_SMOOTHING_DEG = 20.0
-RANK_THREE = 0.1  # sigma_4 / sigma_3 below which the product has found its rank
-GROWTH = 10.0
+LAST_SMOOTHING_DEG = {"l1": 0.03, "l2": 1.0, "l1/2": 0.3}
+FOUND = 0.1  # share of 3n that the leading singular values must have reached before their fall means anything
+FALL = 0.01
 
 
-@method("dmf-synch", title="DMF-Synch", cite="tejus2023", requires=("torch", "numba", "scipy"), robust=True, deterministic=False)
+@method(
+    "dmf-synch",
+    title="DMF-Synch",
+    cite="tejus2023",
+    requires=("torch", "numba", "scipy"),
+    robust=True,
+    deterministic=False,
+)
 @dataclass(frozen=True)
 class DMFSynch:
-    """Minimises the misfit of a product of matrices W_d ... W_1 to the observed blocks, by gradient descent on its factors.
+    """Fits a product of d matrices to the observed blocks by gradient descent on its factors.
 
-    Z is the 3n x 3n matrix of all R_i R_j^T, of rank 3; observed are the measured blocks in both directions and the n identity blocks
-    on the diagonal. The rotations are the projected blocks of the three leading eigenvectors of the product
-    (Tejus et al. 2023, equations 5 to 7, with Arora et al. 2019 behind them). Two forms:
+    Z is the 3n x 3n matrix of all R_i R_j^T, of rank three. Observed are the measured blocks, in both
+    directions, and the n identities on the diagonal. E = W_d ... W_1 is fitted to them; the answer is the
+    projected blocks of its three leading eigenvectors (Tejus et al. 2023, equations 5 to 7, after Arora et
+    al. 2019). There are two forms.
 
-    **dense** is the paper's: d layers of 3n x 3n, entries Gaussian with deviation init_scale^(1/d) (3n)^(-1/2), loss the mean absolute (l1)
-    or squared (l2) misfit over the observed entries, full-batch SGD at 0.3 with momentum 0.9. A full-rank product first finds a robust answer of
-    rank three and then slowly fits the outliers, so that everything hangs on when it is stopped. The published figures are those
-    of the iterate with the smallest error against ground truth; here ``stop=rank`` sees only sigma_4 / sigma_3 of the product: it keeps
-    the checkpoint where this is smallest, and ends once it has grown tenfold. ``stop=limit`` runs on to the limit, as the authors' code does.
-    Other deviations from that code: E is symmetrised before its eigenvectors are taken, its diagonal blocks are not overwritten with
-    identities, and one sign for the whole matrix, not for each block, decides on reflections.
+    **thin**, the default: the hidden width is three, so that the product has no rank to spend on outliers,
+    and only its observed blocks are computed: an iteration costs time proportional to the number of edges.
+    What differs from the paper, besides the width:
 
-    **thin** (the default) cannot fit outliers with rank: the hidden width is 3. Only the observed blocks are computed, so that an iteration costs
-    time proportional to the number of edges. Deviations from the paper, besides the width: the factored matrix is D^(1/2) E D^(1/2), with D
-    the number of observed blocks of each camera (as in normalised spectral synchronization), which makes steps equally long at all
-    cameras; the first and the last factor are each other's transposes and all factors have equal singular values at the start, which gradient descent on a symmetric
-    loss preserves, so that one of each pair is stored; the step falls to zero along a half cosine. The start is the spectral solution to 1e-3
-    radians, or random: then a product of width 8 descends first, and its three leading eigenvectors are the start. The default loss is not the
-    paper's either: "l1/2" is the mean over observed blocks of (|E_ij - R_ij|^2 + s^2)^(1/4) with the Frobenius norm, s falling geometrically from
-    20 degrees to `smoothing_deg`. It is minimised by the same plain gradient steps; nothing is reweighted and no linear system is solved.
+    - What is factored is D^(1/2) E D^(1/2), D being the number of observed blocks of each camera, as in the
+      normalised spectral method; steps are then equally long at all cameras.
+    - All factors start with equal singular values, the last as the transpose of the first, and so on
+      inwards. The loss treats E and its transpose alike, so that gradient descent keeps this symmetry; one
+      of the two ends is stored.
+    - The product starts at the spectral solution (to 1e-3 radians). With ``start=random`` it starts from
+      nothing: a product of width eight descends first, and its leading eigenvectors are the start.
+    - The step falls to zero along half a cosine.
+    - The default loss, "l1/2", is the mean over observed blocks of (|E_ij - R_ij|^2 + s^2)^(1/4), with the
+      Frobenius norm, s falling geometrically from 20 degrees to `smoothing_deg`. Plain gradient steps
+      minimise it: nothing is reweighted, no linear system is solved. "l1" is the paper's, each |x| smoothed
+      to (x^2 + s^2)^(1/2) likewise.
+
+    **dense** is the paper's: d layers of 3n x 3n, their entries Gaussian with deviation init_scale^(1/d)
+    (3n)^(-1/2); the loss the mean absolute (l1) or squared (l2) misfit of the observed entries; full-batch
+    SGD at 0.3 with momentum 0.9. A full-rank product first finds a robust answer of rank three and then
+    slowly fits the outliers, so that everything hangs on when it is stopped. The published figures are
+    those of the iterate with the smallest error against ground truth. Here ``stop=rank`` sees nothing but
+    the product: outliers are fitted at the expense of its three leading singular values, so it keeps the
+    checkpoint where their sum is largest, and ends once the sum has fallen by 1 %. ``stop=limit`` keeps the
+    last iterate. Other deviations from the authors' code: E is symmetrised before its eigenvectors are
+    taken, its diagonal blocks are not overwritten with identities, and one sign for the whole matrix, not
+    one for each block, decides on reflections.
+
+    Why thin is the default: on Ellis Island (227 cameras, mean / median error in degrees, l1 alignment) it
+    ends at 2.55 / 0.51, with ``loss=l1`` at 2.87 / 0.78, at depths 2, 3 and 5 alike, in under a second on
+    one core.
 
     Parameters
     ----------
@@ -59,17 +82,19 @@ class DMFSynch:
     width
         Columns of the hidden factors, at least 3. None: 3 for thin, 3n for dense.
     lr
-        Step. None: 0.3 for dense, where it is that of the mean loss; 0.05 for thin, where it is relative (see `_dmf_thin.descend`).
+        Step. None: 0.3 for dense, where it is that of the mean loss; 0.05 for thin, where it is relative
+        (see `_dmf_thin.descend`).
     momentum
         Share of the last step that is repeated.
     iterations
-        How many (dense: at most). None: 500 for thin, 100,000 for dense.
+        How many; dense: at most. None: 500 for thin, 100,000 for dense.
     checkpoint_every
-        Iterations between two checkpoints. None: 100 for thin, 500 for dense, where it is also how often the rank is looked at.
+        Iterations between two checkpoints. None: 100 for thin, 250 for dense, where the rank is looked at
+        as often.
     start
         Of thin: "spectral" (the default) or "random".
     smoothing_deg
-        Of thin with loss "l1/2": the last s, 0.3 degrees unless given.
+        Of thin: the last s, 0.3 degrees for "l1/2" and 0.03 for "l1" unless given.
     init_scale
         Of dense: size of the start, 1e-3 unless given.
     stop
@@ -112,10 +137,12 @@ class DMFSynch:
             raise ValueError(f"parameter 'momentum' must be at least 0 and below 1, not {self.momentum:g}")
 
     def warm_up(self) -> None:
-        """Compile the kernels and load torch."""
-        triangle = Problem(3, np.array([[0, 1], [0, 2], [1, 2]]), np.tile(np.eye(3), (3, 1, 1)))
-        quick = {"iterations": 1, "depth": self.depth, "loss": self.loss, "form": self.form, "device": self.device}
-        DMFSynch(**quick, width=self.width, start=self.start).solve(triangle, np.random.default_rng(0))  # type: ignore[arg-type]
+        """Compile the kernels and load what `solve` imports."""
+        spectral.compile_and_load()
+        n = max(self.width or 3, 3)
+        chain = np.stack([np.arange(n - 1), np.arange(1, n)], axis=1, dtype=np.int32)
+        problem = Problem(n, chain, np.tile(np.eye(3), (n - 1, 1, 1)))
+        replace(self, iterations=1).solve(problem, np.random.default_rng(0))
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         return self._solve_thin(problem, rng) if self.form == "thin" else self._solve_dense(problem, rng)
@@ -159,15 +186,20 @@ class DMFSynch:
             self._descend(observed, factors, WIDE_LR * (self.lr or 0.05), self.iterations or 500)
             values, vectors = factors.eigenpairs()
             return values[:width], vectors[:, :width]
-        rotations, _ = spectral_rotations(problem, tolerance=START_TOLERANCE)
+        rotations, _ = spectral.spectral_rotations(problem, tolerance=START_TOLERANCE)
         extra = EXTRA * rng.standard_normal((3 * problem.n, width - 3))
         return _eigenpairs(np.hstack([rotations.reshape(-1, 3), extra]) * scale)
 
     def _descend(
-        self, observed: Observed, factors: Factors, lr: float, iterations: int, report: _dmf_thin.Report | None = None
+        self,
+        observed: Observed,
+        factors: Factors,
+        lr: float,
+        iterations: int,
+        report: Report | None = None,
     ) -> float:
         loss: Loss = self.loss or "l1/2"
-        first, last = (_chordal(angle) for angle in (FIRST_SMOOTHING_DEG, self.smoothing_deg or 0.3))
+        last = _chordal(self.smoothing_deg or LAST_SMOOTHING_DEG[loss])
         return _dmf_thin.descend(
             observed,
             factors,
@@ -175,13 +207,13 @@ class DMFSynch:
             lr=lr,
             momentum=self.momentum,
             iterations=iterations,
-            smoothing=(max(first, last), last),
+            smoothing=(max(_chordal(FIRST_SMOOTHING_DEG), last), last),
             report=report,
         )
 
     def _solve_dense(self, problem: Problem, rng: np.random.Generator) -> Estimate:
         clock = time.perf_counter()
-        loss = "l2" if self.loss == "l2" else "l1"
+        loss: Literal["l1", "l2"] = "l2" if self.loss == "l2" else "l1"
         network = _dmf_dense.DenseFactorization(
             problem,
             depth=self.depth,
@@ -190,7 +222,7 @@ class DMFSynch:
             seed=int(rng.integers(2**63 - 1)),
             device=self.device or "cpu",
         )
-        limit, every = self.iterations or 100_000, self.checkpoint_every or 500
+        limit, every = self.iterations or 100_000, self.checkpoint_every or 250
         checkpoints = list[Checkpoint]()
         for iteration in range(limit + 1):
             if iteration % every == 0 or iteration == limit:
@@ -199,42 +231,36 @@ class DMFSynch:
                 seconds = time.perf_counter() - clock
                 found = nearest_rotations(vectors[:, :3])
                 checkpoints.append(Checkpoint(iteration, seconds, found, diagnostics))
-                if self.stop != "limit" and rank_has_grown(checkpoints):
+                if self.stop != "limit" and rank_three_has_passed(checkpoints):
                     break
             if iteration < limit:
                 network.step(loss, self.lr or 0.3, self.momentum)
         return _picked(checkpoints, by_rank=self.stop != "limit")
 
 
-def rank_ratio(checkpoint: Checkpoint) -> float:
-    """sigma_4 / sigma_3 of the product."""
-    return checkpoint.diagnostics["sigma_4"] / checkpoint.diagnostics["sigma_3"]
+def leading_sum(checkpoint: Checkpoint) -> float:
+    """sigma_1 + sigma_2 + sigma_3 of the product; 3n if all of Z were fitted."""
+    return sum(checkpoint.diagnostics[f"sigma_{k}"] for k in (1, 2, 3))
 
 
-def rank_has_grown(checkpoints: list[Checkpoint]) -> bool:
-    """Whether the product has had rank three, and its sigma_4 / sigma_3 has grown tenfold since."""
-    ratios = [rank_ratio(c) for c in checkpoints]
-    return min(ratios) < RANK_THREE and ratios[-1] > GROWTH * min(ratios)
+def rank_three_has_passed(checkpoints: list[Checkpoint]) -> bool:
+    """Whether the three leading singular values have grown to size, and have fallen since."""
+    largest, cameras = max(map(leading_sum, checkpoints)), len(checkpoints[-1].rotations)
+    return largest > FOUND * 3 * cameras and leading_sum(checkpoints[-1]) < (1 - FALL) * largest
 
 
 def _picked(checkpoints: list[Checkpoint], by_rank: bool) -> Estimate:
     last = checkpoints[-1]
-    grown = by_rank and rank_has_grown(checkpoints)
-    best = min(checkpoints, key=rank_ratio) if by_rank else last
-    notes = ()
-    if grown:
-        reason = f"sigma_4/sigma_3 grew tenfold after iteration {best.iteration}, where it was {rank_ratio(best):.1e}"
-    else:
-        reason = "iteration limit"
-        if by_rank and best is not last:
-            notes = (f"kept iteration {best.iteration}, where sigma_4/sigma_3 was smallest: {rank_ratio(best):.1e}",)
+    best = max(checkpoints, key=leading_sum) if by_rank else last
+    passed = by_rank and rank_three_has_passed(checkpoints)
+    kept = f"kept iteration {best.iteration}, where the three leading singular values were largest"
     return Estimate(
         best.rotations,
         iterations=last.iteration,
-        stop_reason=reason,
+        stop_reason="the leading singular values have passed their maximum" if passed else "iteration limit",
         cost=best.diagnostics["cost"],
         checkpoints=tuple(checkpoints),
-        notes=notes,
+        notes=() if best is last else (kept,),
     )
 
 

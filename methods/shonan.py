@@ -20,35 +20,35 @@ class Shonan:
     """Minimises the sum of squared (or Huber) chordal residuals on SO(p), from p = 3 upward until certified.
 
     1. Levenberg-Marquardt on SO(3) from the spectral solution.
-    2. With the squared loss: where the smallest eigenvalue of the certificate matrix is negative, follow its eigenvector
-       to SO(p + 1), optimise there, and so on up to p_max; round to SO(3). With the Huber loss there is no certificate,
-       and GTSAM demands one p: 3.
+    2. With the squared loss: where the smallest eigenvalue of the certificate matrix is negative, follow its
+       eigenvector to SO(p + 1), optimise there, and so on up to p_max; round to SO(3). With the Huber loss
+       there is no certificate, and GTSAM demands one p: 3.
 
-    Source: Dellaert et al. 2020; GTSAM's ShonanAveraging3 with its defaults (Ceres-like Levenberg-Marquardt, conjugate
-    gradients with a block-Jacobi preconditioner, a soft Karcher-mean gauge). Deviations:
+    Source: Dellaert et al. 2020; GTSAM's ShonanAveraging3 with its defaults (Ceres-like Levenberg-Marquardt,
+    conjugate gradients with a block-Jacobi preconditioner, a soft Karcher-mean gauge). Deviations:
 
-    - The start. GTSAM draws random rotations from one generator per process, so that its result would depend on what
-      ran before; for the squared loss the certificate makes the start irrelevant.
-    - The staircase begins at p = 3. GTSAM lifts a start on SO(3) to SO(p) by padding with the identity, where the gradient
-      along the new directions is zero: a higher first p takes the same path more slowly.
-    - `Estimate.certificate` is recomputed for the rounded rotations, because GTSAM's own is found to 1e-3 only,
-      from a random vector.
+    - The start. GTSAM draws random rotations from one generator per process, so that its result would depend
+      on what ran before; for the squared loss the certificate makes the start irrelevant.
+    - The staircase begins at p = 3. GTSAM lifts a start on SO(3) to SO(p) by padding with the identity,
+      where the gradient along the new directions is zero: a higher first p takes the same path more slowly.
+    - `Estimate.certificate` is recomputed for the rounded rotations, because GTSAM's own is found to 1e-3
+      only, from a random vector.
 
-    GTSAM's keys are camera-to-world rotations S_i = R_i^T with measurements S_i^T S_j, which is R_ij as it stands. The
-    weights of a problem are not used.
+    GTSAM's keys are camera-to-world rotations S_i = R_i^T with measurements S_i^T S_j, which is R_ij as it
+    stands. The weights of a problem are not used.
 
     Parameters
     ----------
     loss
         ``l2``, which can be certified, or ``huber``, which is robust.
     sigma_deg
-        Unit of the Huber loss. The residual is chordal, |R_ij - R_i R_j^T|_F = 2 sqrt(2) sin(angle / 2), and counts
-        linearly above 1.345 sigma: with 5, above 4.76 degrees. Without effect on ``l2``.
+        Unit of the Huber loss. The residual is chordal, |R_ij - R_i R_j^T|_F = 2 sqrt(2) sin(angle / 2), and
+        counts linearly above 1.345 sigma: with 5, above 4.76 degrees. Without effect on ``l2``.
     p_max
         Where the staircase ends.
     tolerance
-        Relative decrease of the cost at which Levenberg-Marquardt ends; the default is GTSAM's for Ceres-like
-        parameters.
+        Relative decrease of the cost at which Levenberg-Marquardt ends; the default is GTSAM's for
+        Ceres-like parameters.
 
     Raises
     ------
@@ -65,7 +65,7 @@ class Shonan:
         if self.sigma_deg <= 0:
             raise ValueError(f"sigma_deg must be positive, not {self.sigma_deg:g}")
 
-    def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: ARG002, D102
+    def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         return self._huber(problem) if self.loss == "huber" else self._l2(problem)
 
     def _l2(self, problem: Problem) -> Estimate:

@@ -37,7 +37,7 @@ def simulated(
 
 
 def transformed(problem: Problem, seed: int = 0) -> tuple[Problem, Ints]:
-    """The same problem with cameras relabelled (hence edges reversed) and edges permuted, and the order: new k is old order[k]."""
+    """The problem with cameras relabelled (so edges reversed) and edges permuted; new k is old order[k]."""
     rng = np.random.default_rng(seed)
     order = rng.permutation(problem.n)
     label = np.argsort(order)

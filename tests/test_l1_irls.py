@@ -6,14 +6,14 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
-
-from bench import so3
 from bench.methods import _edge_kernels
 from bench.methods._laplacian import LaplacianSolver
 from bench.methods._losses import LOSSES
 from bench.methods.l1_irls import L1IRLS, LossName
 from bench.methods.spectral import Spectral
+from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
+
+from bench import so3
 from bench.problem import Ints
 
 RNG = np.random.default_rng(0)  # the method draws nothing from it
@@ -26,7 +26,7 @@ EVERY_GRAPH = pytest.mark.parametrize("edges", [DENSE, SPARSE, GRID], ids=["dens
 @pytest.mark.parametrize("name", LOSSES)
 def test_weights_are_derivatives_of_the_losses(name: str) -> None:
     loss = LOSSES[name]
-    x = np.linspace(0.05, 0.95, 40) if name == "talwar" else np.linspace(0.05, 4.05, 401)
+    x = np.linspace(0.05, 0.95, 40) if name == "talwar" else np.linspace(0.053, 4.053, 401)
     step = 1e-6
     derivative = (loss.value(x + step) - loss.value(x - step)) / (2 * step)
     wanted = loss.weight(x) * x

@@ -83,7 +83,10 @@ def test_missing_packages_are_seen_without_importing(tmp_path: Path) -> None:
     [
         ("class M:\n    def solve(self, problem, rng): ...", "put @dataclass"),
         ("@dataclass(frozen=True)\nclass M:\n    x: int = 1", "no method called solve"),
-        ("@dataclass(frozen=True)\nclass M:\n    x: int\n    def solve(self, problem, rng): ...", "'x' needs a default"),
+        (
+            "@dataclass(frozen=True)\nclass M:\n    x: int\n    def solve(self, problem, rng): ...",
+            "'x' needs a default",
+        ),
     ],
 )
 def test_a_wrong_declaration_says_what_to_do(tmp_path: Path, declaration: str, reason: str) -> None:

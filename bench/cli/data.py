@@ -58,7 +58,9 @@ def inspect(name: Name, data_dir: DataDirOption = None, protocol: ProtocolOption
 @app.command("fetch")
 def fetch(
     name: Annotated[str, typer.Argument(metavar="DATASET")],
-    to: Annotated[Path | None, typer.Option("--to", metavar="DIR", help="Folder.  [default: the download cache]")] = None,
+    to: Annotated[
+        Path | None, typer.Option("--to", metavar="DIR", help="Folder.  [default: the download cache]")
+    ] = None,
 ) -> None:
     """Download a dataset: checksum, progress, resumed where it was interrupted."""
     configured = _fetchable(name)
@@ -86,7 +88,7 @@ def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> lis
     return found
 
 
-def _fetchable(name: str):  # type: ignore[no-untyped-def]  # noqa: ANN202
+def _fetchable(name: str):  # type: ignore[no-untyped-def]
     from bench import registry
     from bench.errors import InputError
 

@@ -14,7 +14,7 @@ class Kind(StrEnum):
     METHOD = "method"
 
 
-TEMPLATE = '''"""{title}: one line that says what the method does."""
+TEMPLATE = '''"""{title}: replace this by what the method is."""
 
 from dataclasses import dataclass
 
@@ -28,21 +28,24 @@ from bench.registry import method
 @method("{name}", title="{title}")
 @dataclass(frozen=True)
 class {cls}:
-    """Minimises the squared chordal residuals, one camera at a time.
+    """Minimises the sum of |R_ij R_j - R_i|^2, the rotations relaxed to orthonormal columns.
 
-    Replace this by the objective, the steps and the source of your method. Fields are parameters.
+    The three smallest eigenvectors of the connection Laplacian, projected (Martinec and Pajdla 2007).
+    Replace objective, steps and source by yours. Fields are parameters: ``{name}[weighted=true]``.
     """
 
-    sweeps: int = 500
+    weighted: bool = False
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:
-        """R_ij = R_i R_j^T on every edge (i, j); the problem is connected. NaN marks a camera not solved."""
-        measured = problem.block_matrix().toarray().reshape(problem.n, 3, problem.n, 3)
-        rotations = np.tile(np.eye(3), (problem.n, 1, 1))
-        for _ in range(self.sweeps):
-            for i in range(problem.n):
-                rotations[i] = so3.project(np.einsum("ajb,jbc->ac", measured[i], rotations))
-        return Estimate(rotations, iterations=self.sweeps, stop_reason="all sweeps done")
+        """R_ij = R_i R_j^T on every edge (i, j) of a connected graph; NaN marks a camera not solved."""
+        weights = problem.weights if self.weighted and problem.weights is not None else np.ones(problem.m)
+        degree = np.bincount(problem.edges.ravel(), weights=np.repeat(weights, 2), minlength=problem.n)
+        laplacian = problem.block_matrix(values=-weights, diagonal=degree)
+        _, vectors = np.linalg.eigh(laplacian.toarray())
+        blocks = vectors[:, :3].reshape(problem.n, 3, 3)
+        if np.linalg.det(blocks).sum() < 0:
+            blocks = -blocks
+        return Estimate(so3.project(blocks), notes=("weights used",) if self.weighted else ())
 '''
 
 
@@ -55,7 +58,9 @@ def new(
     from bench.errors import InputError
 
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
-        raise InputError(f"'{name}' is not a name for a {kind.value}: use lower case words joined by hyphens, like 'my-method'")
+        raise InputError(
+            f"'{name}' is not a name for a {kind.value}: use lower case words joined by hyphens, like 'my-method'"
+        )
     path = into / f"{name.replace('-', '_')}.py"
     if path.exists():
         raise InputError(f"{path} exists already; choose another name or folder")

@@ -46,7 +46,8 @@ ProtocolOption = Annotated[
     Protocol | None, typer.Option("--protocol", help="Which cameras of a real scene are solved and scored.")
 ]
 PluginOption = Annotated[
-    list[Path] | None, typer.Option("--plugin", metavar="FILE", help="Python file with more methods or datasets.")
+    list[Path] | None,
+    typer.Option("--plugin", metavar="FILE", help="Python file with more methods or datasets."),
 ]
 DataDirOption = Annotated[
     Path | None, typer.Option("--data-dir", metavar="DIR", help="Folder where data are looked for first.")

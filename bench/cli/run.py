@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, DataDirOption, PluginOption, Protocol, ProtocolOption, Rerun
+from bench.cli.options import Align, AlignOption, DataDirOption, PluginOption, ProtocolOption, Rerun
 
 if TYPE_CHECKING:
     from bench.runner import Run
@@ -23,10 +23,12 @@ def run(
         str | None, typer.Option("--suite", metavar="S", help="Named suite or TOML file.  [default: quick]")
     ] = None,
     method: Annotated[
-        list[str] | None, typer.Option("--method", "-m", metavar="M", help="Only these methods; repeat for more.")
+        list[str] | None,
+        typer.Option("--method", "-m", metavar="M", help="Only these methods; repeat for more."),
     ] = None,
     dataset: Annotated[
-        list[str] | None, typer.Option("--dataset", "-d", metavar="D", help="Only these datasets; repeat for more.")
+        list[str] | None,
+        typer.Option("--dataset", "-d", metavar="D", help="Only these datasets; repeat for more."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the run.  [default: results/runs/SUITE]")
@@ -70,7 +72,10 @@ def run(
     try:
         _execute(planned)
     except KeyboardInterrupt:
-        typer.echo(f"\ninterrupted; what is done is kept in {planned.store.folder}, and the same command continues", err=True)
+        typer.echo(
+            f"\ninterrupted; what is done is kept in {planned.store.folder}, and the same command continues",
+            err=True,
+        )
         raise typer.Exit(130) from None
     _present(planned, align)
 
@@ -79,7 +84,9 @@ def _intention(planned: "Run") -> str:
     todo, total = len(planned.todo), len(planned.cells)
     instances = len({cell.job.instance_key for cell in planned.cells})
     done = f", {total - todo} of them done already" if todo < total else ""
-    return f"suite {planned.experiment.suite.name}: {total} jobs on {instances} instances{done} -> {planned.store.folder}"
+    return (
+        f"suite {planned.experiment.suite.name}: {total} jobs on {instances} instances{done} -> {planned.store.folder}"
+    )
 
 
 def _list_cells(planned: "Run") -> None:
@@ -98,7 +105,14 @@ def _list_cells(planned: "Run") -> None:
 def _execute(planned: "Run") -> None:
     """Run what is to do, one line a job, with a progress bar and an ETA where there is a terminal."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     from bench.selection import format_selection
 

@@ -12,7 +12,7 @@ def table(
     run: RunFolder,
     align: AlignOption = Align.L1,
     protocol: ProtocolOption = None,
-    format: Format = Format.CONSOLE,  # noqa: A002 - the name of the option
+    format: Format = Format.CONSOLE,
 ) -> None:
     """Print the table of a run; nothing is run. Notes go to standard error."""
     from bench.reporting.present import render_table

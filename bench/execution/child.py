@@ -67,7 +67,7 @@ def save_problem(path: Path, problem: Problem) -> None:
 def load_problem(path: Path) -> Problem:
     """Read what `save_problem` wrote."""
     with np.load(path, allow_pickle=False) as data:
-        weights = data["weights"] if "weights" in data else None
+        weights = data.get("weights", None)
         return Problem(int(data["n"]), data["edges"], data["rotations"], weights)
 
 
@@ -192,7 +192,7 @@ def _scalars(estimate: Estimate) -> dict[str, Any]:
 
 def save_estimate(path: Path, estimate: Estimate) -> None:
     """Write the arrays of an estimate, float64 and unrounded, as ``.npz``."""
-    arrays = {"rotations": np.asarray(estimate.rotations, dtype=np.float64)}
+    arrays: dict[str, Any] = {"rotations": np.asarray(estimate.rotations, dtype=np.float64)}
     if estimate.edge_weights is not None:
         arrays["edge_weights"] = np.asarray(estimate.edge_weights, dtype=np.float64)
     if estimate.checkpoints:
@@ -204,10 +204,10 @@ def save_estimate(path: Path, estimate: Estimate) -> None:
 def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
     """Read what `save_estimate` wrote, with the scalars that the record holds."""
     with np.load(path, allow_pickle=False) as data:
-        states = data["checkpoints"] if "checkpoints" in data else ()
+        states = data.get("checkpoints", ())
         return Estimate(
             rotations=data["rotations"],
-            edge_weights=data["edge_weights"] if "edge_weights" in data else None,
+            edge_weights=data.get("edge_weights", None),
             iterations=scalars.get("iterations"),
             stop_reason=scalars.get("stop_reason", ""),
             cost=scalars.get("cost"),

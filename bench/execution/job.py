@@ -10,7 +10,7 @@ from typing import Any
 
 from bench import provenance
 from bench.execution import outcome
-from bench.execution.child import ESTIMATE_FILE, RESULT_FILE, Request
+from bench.execution.child import RESULT_FILE, Request
 from bench.execution.launch import LOG_FILE, Launcher
 from bench.execution.outcome import Outcome
 from bench.execution.supervise import Limits, supervise
@@ -45,7 +45,11 @@ def execute(
 
 
 def record_of(
-    job: Mapping[str, Any], requires: tuple[str, ...], limits: Limits, ended: Outcome, report: Mapping[str, Any]
+    job: Mapping[str, Any],
+    requires: tuple[str, ...],
+    limits: Limits,
+    ended: Outcome,
+    report: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Everything that is kept of a job besides its arrays."""
     return {
@@ -67,5 +71,3 @@ def _tail(path: Path) -> str:
             return file.read().decode(errors="replace")
     except FileNotFoundError:
         return ""
-
-

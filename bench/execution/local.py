@@ -1,7 +1,7 @@
 """The local engine: threads that each supervise one child at a time."""
 
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import asdict
 from typing import Any
@@ -41,7 +41,7 @@ class LocalEngine:
         self.launcher = Launcher(threads)
         self.stop = threading.Event()
 
-    def run(self, cells: Iterable[Cell]) -> Iterator[Finished]:
+    def run(self, cells: Iterable[Cell]) -> Generator[Finished, None, None]:
         """Yield each cell with its record as soon as it is stored.
 
         When the caller stops iterating, jobs in progress are ended without a record.

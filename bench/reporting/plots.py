@@ -70,7 +70,7 @@ def error_per_scene(frame: pd.DataFrame, errors: Errors) -> Figure:
                         fontsize=7,
                     )
         first = axes[0]
-        first.set(xscale="log", xlim=(low / 1.5, 200), ylim=(len(look) - 0.5, -0.5))
+        first.set(xlim=(low / 1.5, 200), xscale="log", ylim=(len(look) - 0.5, -0.5))
         first.set_yticks(range(len(look)), [style.label for style in look.values()])
         for ax in axes:
             log_axis(ax.xaxis, low / 1.5, 200, CURVE_TICKS if low > 0.05 else ANGLE_TICKS)
@@ -105,7 +105,7 @@ def cumulative_errors(frame: pd.DataFrame, errors: Errors) -> Figure:
                         linestyle=style.line,
                         linewidth=1.2,
                     )
-        axes[0].set(xscale="log", xlim=(CURVE_TICKS[0], 180), ylim=(0, 101))
+        axes[0].set(xlim=(CURVE_TICKS[0], 180), xscale="log", ylim=(0, 101))
         for ax in axes:
             log_axis(ax.xaxis, CURVE_TICKS[0], 180, CURVE_TICKS)
         _label_bottom(axes, "angle (°)")
@@ -127,7 +127,7 @@ def error_against_time(frame: pd.DataFrame, *, aggregated: bool = False) -> Figu
         all of them; otherwise a panel for each scene.
     """
     look = looks(frame)
-    by_panel, left_out = _time_panels(frame, look, aggregated)
+    by_panel, remarks = _time_panels(frame, look, aggregated)
     drawn = {key for _, rows in by_panel for key in rows.index}
     with styled():
         handles = [
@@ -150,15 +150,15 @@ def error_against_time(frame: pd.DataFrame, *, aggregated: bool = False) -> Figu
         _label_left(axes, "median error (°)")
         floor = f" Errors below {FLOOR_DEG:g}° count as {FLOOR_DEG:g}°."
         floored = floor if (everything["median_deg"] <= FLOOR_DEG).any() else ""
-        what = f"Lower left is better; {times_note(frame)}.{left_out}{floored}"
-        describe(figure, "Error against time", f"{what} {_rules(frame)}")
+        what = f"Lower left is better; {times_note(frame)}. {_rules(frame)}{remarks}{floored}"
+        describe(figure, "Error against time", what)
     return figure
 
 
 def _time_panels(
     frame: pd.DataFrame, look: Mapping[Configured, Look], aggregated: bool
 ) -> tuple[list[tuple[str, pd.DataFrame]], str]:
-    """Title and (method, params) -> ``solve_s, median_deg`` of each panel; and which methods are left out."""
+    """Title and (method, params) -> ``solve_s, median_deg`` of each panel; and what is left out."""
     scored = frame[(frame["status"] == OK) & frame["median_deg"].notna() & frame["solve_s"].notna()]
     scored = scored.assign(
         solve_s=pd.to_numeric(scored["solve_s"]).clip(lower=FLOOR_S),
@@ -167,14 +167,16 @@ def _time_panels(
     keys = ["dataset", "instance", "protocol", "method", "params"]
     points = scored.groupby(keys, sort=False)[["solve_s", "median_deg"]].mean()
     places: list[Place] = list(dict.fromkeys(key[:3] for key in points.index))
+    remarks = _not_drawn(frame, places)
     if not aggregated:
-        return [(_title(place, frame), points.loc[place]) for place in places], ""
+        return [(_title(place, frame), points.loc[place]) for place in places], remarks
     by_method = np.log(points).groupby(["method", "params"], sort=False)
     complete = by_method.size() == len(places)
     rows = np.exp(by_method.mean()[complete])
     incomplete = [look[key].label for key, ended in complete.items() if not ended]
-    left_out = f" Not on every scene, so left out: {', '.join(incomplete)}." if incomplete else ""
-    return [(f"geometric means over {len(places)} scenes", rows)], left_out
+    if incomplete:
+        remarks += f" Not on every scene, so left out: {', '.join(incomplete)}."
+    return [(f"geometric means over {len(places)} scenes", rows)], remarks
 
 
 def _spread(ax: Axes, row: int, values: Floats, style: Look) -> float:
@@ -205,7 +207,7 @@ def _frontier(ax: Axes, rows: pd.DataFrame) -> None:
 
 def _log_limits(axes: Sequence[Axes], times: pd.Series, errors: pd.Series) -> None:
     x, y = _limits(times), _limits(errors)
-    axes[0].set(xscale="log", yscale="log", xlim=x, ylim=y)
+    axes[0].set(xlim=x, ylim=y, xscale="log", yscale="log")
     for ax in axes:
         log_axis(ax.xaxis, *x, _ticks(*x))
         log_axis(ax.yaxis, *y, _ticks(*y))
@@ -272,14 +274,13 @@ def _rules(frame: pd.DataFrame) -> str:
 
 
 def _caption(frame: pd.DataFrame, errors: Errors, floored: bool = False) -> str:
-    drawn = _scored(frame, errors)
-    unknown = [_title(place, frame).replace("\n", " ") for place in _places(frame) if place not in drawn]
-    parts = [_rules(frame)]
-    if floored:
-        parts.append(f"Errors below {FLOOR_DEG:g}° are drawn there.")
-    if unknown:
-        parts.append(f"Not drawn, without ground truth or result: {', '.join(unknown)}.")
-    return " ".join(parts)
+    floor = f" Errors below {FLOOR_DEG:g}° are drawn there." if floored else ""
+    return f"{_rules(frame)}{_not_drawn(frame, _scored(frame, errors))}{floor}"
+
+
+def _not_drawn(frame: pd.DataFrame, drawn: Sequence[Place]) -> str:
+    left = [_title(place, frame).replace("\n", " ") for place in _places(frame) if place not in drawn]
+    return f" Not drawn, without ground truth or result: {', '.join(left)}." if left else ""
 
 
 def _label_bottom(axes: Sequence[Axes], text: str) -> None:

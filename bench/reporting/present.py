@@ -8,7 +8,9 @@ from bench.results import Results
 EXTENSIONS = {"console": "txt", "markdown": "md", "csv": "csv", "latex": "tex"}
 
 
-def render_table(results: Results, style: str, *, width: int = 100, terminal: bool = False) -> tuple[str, tuple[str, ...]]:
+def render_table(
+    results: Results, style: str, *, width: int = 100, terminal: bool = False
+) -> tuple[str, tuple[str, ...]]:
     """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render`."""
     return tables.render(
         results.frame, results.ties, results.footnotes, style, width=width, terminal=terminal

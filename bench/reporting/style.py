@@ -36,6 +36,7 @@ SETTINGS: dict[Any, Any] = {
     "legend.fontsize": 7.5,
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
+    "text.parse_math": False,  # a title may hold a dollar sign
     "svg.hashsalt": "rotsync-bench",
     "savefig.dpi": 200,
 }

@@ -1,0 +1,266 @@
+import numpy as np
+import pytest
+
+from bench import so3
+from bench.errors import InputError
+from bench.problem import Problem
+from bench.scoring.alignment import RULES, align
+from bench.scoring.errors import camera_errors, edge_metrics, summary
+from bench.scoring.statistics import confidence_interval, seed_half_width, tie_groups
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)
+
+
+every_rule = pytest.mark.parametrize("rule", RULES)
+
+
+def noise(rng, size, degrees):
+    return so3.exp(np.radians(degrees) * rng.standard_normal((size, 3)))
+
+
+def transpose(r):
+    return np.swapaxes(r, -1, -2)
+
+
+def cost(center, r):
+    return so3.angle_between(r, center).sum()
+
+
+def folded_scene(rng, n=300):
+    """Truth, and an estimate of which a quarter is turned by 25 degrees as one piece."""
+    truth = so3.random(rng, n)
+    fold = np.tile(np.eye(3), (n, 1, 1))
+    fold[: n // 4] = so3.exp(np.radians(25) * so3.random_axes(rng, 1))
+    return truth, noise(rng, n, 1.4) @ truth @ fold
+
+
+class TestGeodesicMedian:
+    def test_is_a_member_that_outweighs_the_rest(self, rng):
+        center = so3.random(rng, 1)[0]
+        r = np.concatenate([np.repeat(center[None], 7, axis=0), so3.random(rng, 5)])
+        assert np.degrees(so3.angle_between(so3.geodesic_median(r), center)) < 1e-9
+
+    def test_identical_members(self):
+        assert np.array_equal(so3.geodesic_median(np.tile(np.eye(3), (4, 1, 1))), np.eye(3))
+
+    @pytest.mark.parametrize("size", [1, 2, 3, 4])
+    def test_no_member_is_cheaper(self, rng, size):
+        for _ in range(20):
+            r = so3.random(rng, size)
+            median = so3.geodesic_median(r)
+            assert cost(median, r) <= min(cost(member, r) for member in r) + 1e-9
+
+    def test_finds_the_tenth_that_agrees_among_random_rotations(self, rng):
+        center = so3.random(rng, 1)[0]
+        r = np.concatenate([so3.random(rng, 180), noise(rng, 20, 1) @ center])
+        assert np.degrees(so3.angle_between(so3.geodesic_median(rng.permutation(r)), center)) < 3
+
+    def test_no_step_goes_down(self, rng):
+        r = np.concatenate([so3.random(rng, 30), noise(rng, 70, 10)])
+        median = so3.geodesic_median(r)
+        steps = so3.exp(1e-4 * so3.random_axes(rng, 50))
+        assert all(cost(step @ median, r) >= cost(median, r) for step in steps)
+
+
+class TestAlignment:
+    @every_rule
+    def test_recovers_a_known_gauge(self, rng, rule):
+        truth, gauge = so3.random(rng, 40), so3.random(rng, 1)[0]
+        found = align(truth @ gauge.T, truth, rule)
+        assert np.degrees(so3.angle_between(found, gauge)) < 1e-10
+
+    def test_rules_agree_where_the_errors_are_small(self, rng):
+        truth = so3.random(rng, 200)
+        estimate = noise(rng, 200, 0.2) @ truth
+        medians = [summary(camera_errors(estimate, truth, rule))["median_deg"] for rule in RULES]
+        assert np.ptp(medians) < 0.02
+
+    def test_rules_part_on_a_folded_scene(self, rng):
+        truth, estimate = folded_scene(rng)
+        median = {rule: summary(camera_errors(estimate, truth, rule))["median_deg"] for rule in RULES}
+        assert median["l1"] == pytest.approx(2.9, abs=0.2)
+        assert median["anchors"] == pytest.approx(2.9, abs=0.2)
+        assert median["chordal"] == pytest.approx(7.1, abs=0.2)
+        assert median["karcher"] == pytest.approx(7.2, abs=0.2)
+
+    @every_rule
+    def test_turning_either_world_changes_no_error(self, rng, rule):
+        truth, estimate = folded_scene(rng, 60)
+        w, v = so3.random(rng, 2)
+        expected = camera_errors(estimate, truth, rule)
+        assert np.allclose(camera_errors(estimate @ w, truth @ v, rule), expected, rtol=0, atol=1e-6)
+
+    @every_rule
+    def test_is_deterministic(self, rng, rule):
+        truth, estimate = folded_scene(rng, 60)
+        assert np.array_equal(align(estimate, truth, rule), align(estimate, truth, rule))
+
+    @every_rule
+    def test_one_camera_is_aligned_exactly(self, rng, rule):
+        truth, estimate = so3.random(rng, 1), so3.random(rng, 1)
+        assert camera_errors(estimate, truth, rule)[0] < 1e-12
+
+    def test_an_unknown_rule_names_the_nearest(self):
+        with pytest.raises(InputError, match="did you mean 'chordal'"):
+            align(np.eye(3)[None], np.eye(3)[None], "cordal")
+
+
+class TestCameraErrors:
+    @pytest.mark.parametrize("degrees", [1e-9, 1e-6, 1, 90, 179.999999])
+    def test_angles_are_exact_from_a_billionth_of_a_degree_on(self, rng, degrees):
+        truth = so3.random(rng, 9)
+        estimate = truth.copy()
+        estimate[4] = so3.exp(np.radians(degrees) * so3.random_axes(rng, 1)[0]) @ truth[4]
+        errors = camera_errors(estimate, truth)
+        assert errors[4] == pytest.approx(degrees, abs=1e-13, rel=1e-9)
+        assert np.delete(errors, 4).max() < 1e-13
+
+    @every_rule
+    def test_missing_cameras_are_nan_and_take_no_part(self, rng, rule):
+        truth, estimate = folded_scene(rng, 50)
+        expected = camera_errors(estimate[6:], truth[6:], rule)
+        estimate[:3], truth[3:6] = np.nan, np.nan
+        errors = camera_errors(estimate, truth, rule)
+        assert np.isnan(errors[:6]).all()
+        assert np.allclose(errors[6:], expected)
+
+    def test_nothing_in_common(self):
+        truth = np.full((3, 3, 3), np.nan)
+        assert np.isnan(camera_errors(np.tile(np.eye(3), (3, 1, 1)), truth)).all()
+
+
+class TestSummary:
+    def test_values(self):
+        found = summary(np.array([0.5, 2, np.nan, 4, 9.5]))
+        assert found["mean_deg"] == 4
+        assert found["median_deg"] == 3
+        assert found["rms_deg"] == pytest.approx(np.sqrt((0.25 + 4 + 16 + 90.25) / 4))
+        assert found["max_deg"] == 9.5
+        assert found["p90_deg"] == pytest.approx(7.85)
+        assert [found[f"within_{k}_deg"] for k in (1, 3, 5, 10, 30)] == [0.25, 0.5, 0.75, 1, 1]
+        assert found["n_scored"] == 4
+
+    def test_nothing_scored_has_the_same_keys(self):
+        found = summary(np.full(3, np.nan))
+        assert found.keys() == summary(np.ones(3)).keys()
+        assert found["n_scored"] == 0
+        assert np.isnan(found["within_5_deg"])
+
+
+class TestEdgeMetrics:
+    @pytest.fixture
+    def triangle(self, rng):
+        """Three cameras; the last measurement is 30 degrees off."""
+        truth = so3.random(rng, 3)
+        edges = np.array([[0, 1], [0, 2], [1, 2]])
+        measured = truth[edges[:, 0]] @ transpose(truth[edges[:, 1]])
+        measured[2] = measured[2] @ so3.exp(np.radians([0, 0, 30]))
+        return Problem(3, edges, measured), truth
+
+    def test_costs_at_the_truth(self, triangle):
+        problem, truth = triangle
+        found = edge_metrics(problem, truth, truth)
+        assert found["residual_mean_deg"] == pytest.approx(10)
+        assert found["residual_median_deg"] == pytest.approx(0, abs=1e-9)
+        assert found["cost_l1"] == found["cost_l1_truth"] == pytest.approx(np.radians(10))
+        chord = np.linalg.norm(np.eye(3) - so3.exp(np.radians([0, 0, 30]))) ** 2
+        assert found["cost_l2"] == found["cost_l2_truth"] == pytest.approx(chord / 3)
+
+    def test_costs_compare_the_same_edges(self, triangle):
+        problem, truth = triangle
+        partly = truth.copy()
+        partly[0] = np.nan
+        found = edge_metrics(problem, truth, partly)
+        assert found["residual_mean_deg"] == pytest.approx(10)
+        assert found["cost_l1"] == found["cost_l1_truth"] == pytest.approx(np.radians(30))
+
+    def test_without_truth(self, triangle):
+        problem, truth = triangle
+        found = edge_metrics(problem, truth)
+        assert found["cost_l1"] == pytest.approx(np.radians(10))
+        assert np.isnan(found["cost_l1_truth"])
+
+    def test_no_edge_solved(self, triangle):
+        problem, truth = triangle
+        assert all(np.isnan(v) for v in edge_metrics(problem, np.full_like(truth, np.nan), truth).values())
+
+
+class TestTies:
+    def test_tells_a_worse_method_from_two_good_ones(self, rng):
+        scene = rng.gamma(2, 1, 200)
+        jitter = np.exp(0.2 * rng.standard_normal((3, 200)))
+        errors = {"a": scene * jitter[0], "b": scene * jitter[1], "worse": 1.6 * scene * jitter[2]}
+        assert tie_groups(errors) == {"a", "b"}
+        assert tie_groups(errors, "mean") == {"a", "b"}
+        assert tie_groups(errors) == tie_groups(errors)
+
+    def test_pairing_sees_a_small_constant_difference(self, rng):
+        scene = rng.gamma(2, 1, 100)
+        assert tie_groups({"a": scene, "b": scene + 0.05}) == {"a"}
+
+    def test_exact_recoveries_tie(self):
+        assert tie_groups({"a": np.full(30, 1e-14), "b": np.full(30, 1e-8)}) == {"a", "b"}
+
+    def test_leaving_out_the_hard_cameras_does_not_win(self, rng):
+        scene = rng.gamma(2, 1, 100)
+        easy = np.where(scene < np.median(scene), 0.9 * scene, np.nan)
+        assert tie_groups({"all": scene, "easy": easy}) == {"all"}
+
+    def test_a_few_missing_cameras_are_compared_without(self, rng):
+        scene = rng.gamma(2, 1, 100)
+        nearly = scene + 1
+        nearly[:3] = np.nan
+        assert tie_groups({"all": scene, "nearly": nearly}) == {"all"}
+
+    def test_too_few_cameras_tie(self):
+        assert tie_groups({"a": np.ones(5), "b": np.full(5, 9.0)}) == {"a", "b"}
+
+    def test_nothing_scored(self):
+        assert tie_groups({}) == set()
+        assert tie_groups({"a": np.full((2, 20), np.nan)}) == set()
+
+    def test_seeds_where_one_failed_for_everybody(self, rng):
+        a = rng.gamma(2, 1, (4, 50))
+        a[1] = np.nan
+        assert tie_groups({"a": a, "b": 2 * a}) == {"a"}
+        assert tie_groups({"a": a, "b": 2 * a}, same_cameras=False) == {"a"}
+
+    def test_luck_of_the_seed_is_not_a_difference(self, rng):
+        """Methods that differ only by a factor drawn anew for each seed."""
+        luck = np.exp(0.5 * rng.standard_normal((6, 4, 1)))
+        errors = luck * rng.gamma(2, 1, (1, 4, 400))
+        assert tie_groups(dict(enumerate(errors)), same_cameras=False) == set(range(6))
+
+    @pytest.mark.parametrize("statistic", ["mean", "median"])
+    def test_false_alarms_are_near_the_level(self, statistic):
+        trials, methods = 80, 6
+        alarms = 0
+        for trial in range(trials):
+            rng = np.random.default_rng(trial)
+            errors = rng.gamma(2, 1, 60) * np.exp(0.3 * rng.standard_normal((methods, 60)))
+            alarms += len(tie_groups(dict(enumerate(errors)), statistic)) < methods
+        assert alarms / trials <= (0.2 if statistic == "mean" else 0.1)
+
+
+class TestIntervals:
+    def test_covers_about_as_often_as_it_says(self):
+        hits = 0
+        for trial in range(100):
+            low, high = confidence_interval(np.random.default_rng(trial).exponential(1, 80))
+            hits += low <= np.log(2) <= high
+        assert hits >= 88
+
+    def test_cameras_shared_by_the_seeds_are_not_counted_twice(self, rng):
+        errors = np.tile(rng.exponential(1, 60), (5, 1))
+        width = {same: np.diff(confidence_interval(errors, same_cameras=same))[0] for same in (True, False)}
+        assert width[True] > 1.5 * width[False]
+
+    def test_nothing_scored(self):
+        assert np.isnan(confidence_interval(np.full((2, 9), np.nan))).all()
+
+    def test_half_width_over_seeds(self):
+        assert seed_half_width([1, 2, 3]) == pytest.approx(4.302653 / np.sqrt(3))
+        assert np.isnan(seed_half_width([1, np.nan]))
