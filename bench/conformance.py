@@ -61,13 +61,17 @@ class _Kit:
     info: Info
     solver: SingleSolver
 
+    def promised(self, fact: str) -> float | None:
+        """Promise of the method as configured: its attribute of that name, or what its declaration says."""
+        return getattr(self.info.configure(self.solver.parameters), fact, self.info.facts[fact])
+
     @property
     def exact_deg(self) -> float:
-        return float(self.info.facts["exact_to_deg"])
+        return float(self.promised("exact_to_deg") or 0)
 
     @property
     def invariant_deg(self) -> float:
-        tolerance = self.info.facts["invariant_to_deg"]
+        tolerance = self.promised("invariant_to_deg")
         if tolerance is None:
             raise NotApplicable("the method does not promise it on noisy data")
         return float(tolerance)

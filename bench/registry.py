@@ -173,7 +173,7 @@ def method(
         How closely it promises to recover small noise-free problems.
     invariant_to_deg
         How far relabelling cameras, permuting or reversing edges and turning frames may move its answer to a small
-        noisy problem; None promises nothing.
+        noisy problem; None promises nothing. Attributes of these names override both.
     """
     facts = {
         "install": install,

@@ -104,7 +104,8 @@ def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, 
         scores |= edge_metrics(instance.problem, rotations, instance.truth)
         if instance.truth is not None:
             errors = camera_errors(rotations, instance.truth, rule)
-            collected.errors.setdefault(place, {}).setdefault(method, []).append(errors)
+    if instance.truth is not None:
+        collected.errors.setdefault(place, {}).setdefault(method, []).append(errors)
     collected.rows.append(
         {
             "dataset": dataset,

@@ -127,6 +127,9 @@ def _resolved(suite_name: str | None, methods: Sequence[str], datasets: Sequence
     known_methods = registry.catalog("method", options.plugins)
     known_datasets = registry.catalog("dataset", options.plugins)
     own = [str(Path(path).resolve()) for path in options.plugins]
+    for origin in own:
+        if origin in known_methods.broken:
+            raise InputError(f"--plugin {origin} is broken: {known_methods.broken[origin]}")
     plugged_in = [info.name for info in known_methods if info.origin in own]
     changes: dict[str, Any] = {
         "methods": experiment.narrowed(suite.methods, methods) if methods else (*suite.methods, *plugged_in),

@@ -35,9 +35,7 @@ class DenseFactorization:
         Where torch computes.
     """
 
-    def __init__(
-        self, problem: Problem, *, depth: int, width: int, init_scale: float, seed: int, device: str
-    ) -> None:
+    def __init__(self, problem: Problem, *, depth: int, width: int, init_scale: float, seed: int, device: str) -> None:
         import torch
 
         size = 3 * problem.n
@@ -82,6 +80,11 @@ class DenseFactorization:
         Returns
         -------
         cost, values (4,) descending, vectors (3n, 4)
+
+        Raises
+        ------
+        FloatingPointError
+            When the steps were so large that the product diverged.
         """
         product = self.products()[-1]
         residual = product - self._measured

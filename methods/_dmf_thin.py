@@ -139,6 +139,11 @@ def descend(
     -------
     float
         The loss after the last step: a mean over observed entries, or for "l1/2" over observed blocks.
+
+    Raises
+    ------
+    FloatingPointError
+        When the step is so large that the product diverges.
     """
     count, width = observed.count, factors.end.shape[1]
     n, depth = len(count), len(factors.middle) + 2
@@ -156,6 +161,8 @@ def descend(
         cost = kernel(
             observed.first, observed.neighbour, observed.blocks, left, right.T.copy(), np.float32(scale), sums
         )
+        if not np.isfinite(cost):
+            raise FloatingPointError(f"the product diverged after {t} iterations; a smaller lr may help")
         if report is not None:
             report(t, cost)
         if t == iterations:
@@ -186,9 +193,7 @@ def edge_kernel(width: int, loss: Loss) -> Callable[..., float]:
     size = 3 * width
 
     @numba.njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
-    def kernel(
-        first: Any, neighbour: Any, blocks: Any, left: Any, right: Any, scale: Any, sums: Any
-    ) -> float:
+    def kernel(first: Any, neighbour: Any, blocks: Any, left: Any, right: Any, scale: Any, sums: Any) -> float:
         near = np.empty((size, CHUNK), np.float32)
         residual = np.empty((9, CHUNK), np.float32)
         square = np.empty(CHUNK, np.float32)

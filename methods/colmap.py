@@ -16,6 +16,7 @@ from bench.registry import method
     requires=("pycolmap",),
     install="python -m pip install 'rotsync-bench[colmap]'",
     robust=True,
+    invariant_to_deg=0.5,  # its iterations stop at a mean step of 1e-3 rad
 )
 @dataclass(frozen=True)
 class Colmap:

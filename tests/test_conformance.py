@@ -17,7 +17,8 @@ CONFIGURATIONS = [
     "l1-irls[loss=l-half]",
     "shonan[loss=[l2,huber]]",
     "colmap",
-    "dmf-synch[depth=[2,3]]",
+    "dmf-synch[depth=[2,3,5]]",
+    "dmf-synch[loss=[l1,l2]]",
     "dmf-synch[form=dense]",
 ]
 

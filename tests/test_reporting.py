@@ -231,8 +231,7 @@ class TestPlots:
 
     def test_files_do_not_depend_on_the_day(self, run, tmp_path):
         first, second = (
-            plots.save(plots.cumulative_errors(run[0], run[1]), tmp_path / name, "fig", ("pdf", "svg"))
-            for name in "ab"
+            plots.save(plots.cumulative_errors(run[0], run[1]), tmp_path / name, "fig", ("pdf", "svg")) for name in "ab"
         )
         assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
 
@@ -292,9 +291,7 @@ class TestPlots:
         rng = np.random.default_rng(0)
         methods = [(f"m{k}", f"A method with a long name {k}", "depth=3") for k in range(25)]
         values = {(m, p): (rng.gamma(2, 1, 20),) for m, _, p in methods}
-        frame = pd.DataFrame(
-            [row("Ellis_Island", method, values[method[0], method[2]][0]) for method in methods]
-        )
+        frame = pd.DataFrame([row("Ellis_Island", method, values[method[0], method[2]][0]) for method in methods])
         for draw in (plots.cumulative_errors(frame, {PLACE: values}), plots.error_against_time(frame)):
             draw.draw_without_rendering()
             legend = draw.legends[0].get_window_extent()

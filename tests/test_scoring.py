@@ -228,11 +228,21 @@ class TestTies:
         assert tie_groups({"a": a, "b": 2 * a}) == {"a"}
         assert tie_groups({"a": a, "b": 2 * a}, same_cameras=False) == {"a"}
 
-    def test_luck_of_the_seed_is_not_a_difference(self, rng):
+    def test_luck_of_the_seed_is_not_a_difference(self):
         """Methods that differ only by a factor drawn anew for each seed."""
-        luck = np.exp(0.5 * rng.standard_normal((6, 4, 1)))
-        errors = luck * rng.gamma(2, 1, (1, 4, 400))
-        assert tie_groups(dict(enumerate(errors)), same_cameras=False) == set(range(6))
+        alarms = 0
+        for trial in range(50):
+            rng = np.random.default_rng(trial)
+            luck = np.exp(0.3 * rng.standard_normal((6, 5, 1)))
+            errors = luck * rng.gamma(2, 1, (1, 5, 40))
+            alarms += len(tie_groups(dict(enumerate(errors)), same_cameras=False)) < 6
+        assert alarms <= 6
+
+    def test_three_seeds_suffice_for_a_gross_difference(self, rng):
+        scene = rng.gamma(2, 1, (3, 40))
+        luck = np.exp(0.2 * rng.standard_normal((4, 3, 1)))
+        errors = scene * luck * np.array([1, 1, 8, 9]).reshape(4, 1, 1)
+        assert tie_groups(dict(enumerate(errors)), same_cameras=False) == {0, 1}
 
     @pytest.mark.parametrize("statistic", ["mean", "median"])
     def test_false_alarms_are_near_the_level(self, statistic):

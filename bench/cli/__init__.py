@@ -13,7 +13,7 @@ app = typer.Typer(
     name="bench",
     help="Compare rotation synchronization (multiple rotation averaging) methods.",
     no_args_is_help=True,
-    add_completion=True,
+    rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
 app.command("run")(run.run)

@@ -77,9 +77,7 @@ def _table(scene: Scene, entries: Iterable[Entry], width: int) -> Table:
         table.add_column(title, justify="right", no_wrap=True)
     if partial:
         table.add_column("seeds", justify="right", no_wrap=True)
-    table.add_column(
-        "solved/scored/all" if width >= WIDE and not several else "cameras", justify="right", no_wrap=True
-    )
+    table.add_column("solved/scored/all" if width >= WIDE and not several else "cameras", justify="right", no_wrap=True)
     for entry in entries:
         cells = [_cell(entry.values.get(name, Value(math.nan)), name) for name, _ in columns]
         if partial:

@@ -213,9 +213,7 @@ def _notes(group: Sequence[Scene], cells: Sequence[str]) -> list[str]:
         UNKNOWN: "solved, but no camera has ground truth",
         ABSENT: "not in this run",
     }
-    marks = [
-        meaning if mark == "(" else f"{mark}: {meaning}" for mark, meaning in legend.items() if mark in text
-    ]
+    marks = [meaning if mark == "(" else f"{mark}: {meaning}" for mark, meaning in legend.items() if mark in text]
     used = set(re.split(r"[ /]", text))
     marks += [f"{short}: {name}" for name, short in ABBREVIATIONS.items() if short in used]
     if any(e.seeds > 1 for scene in group for e in scene.entries):

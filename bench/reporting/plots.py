@@ -96,9 +96,7 @@ def cumulative_errors(frame: pd.DataFrame, errors: Errors) -> Figure:
                 if len(values):
                     share = 100 * np.arange(1, len(values) + 1) / len(values)
                     ax.step(
-                        np.concatenate(
-                            [[CURVE_TICKS[0] / 10], np.maximum(values, CURVE_TICKS[0] / 10), [360]]
-                        ),
+                        np.concatenate([[CURVE_TICKS[0] / 10], np.maximum(values, CURVE_TICKS[0] / 10), [360]]),
                         np.concatenate([[0], share, [100]]),
                         where="post",
                         color=style.color,
@@ -245,9 +243,7 @@ def _pooled(errors: Iterable[Floats]) -> Floats:
 
 def _at(frame: pd.DataFrame, place: Place) -> pd.DataFrame:
     dataset, instance, protocol = place
-    return frame[
-        (frame["dataset"] == dataset) & (frame["instance"] == instance) & (frame["protocol"] == protocol)
-    ]
+    return frame[(frame["dataset"] == dataset) & (frame["instance"] == instance) & (frame["protocol"] == protocol)]
 
 
 def _status(frame: pd.DataFrame, place: Place, method: Configured) -> str:

@@ -12,9 +12,7 @@ def render_table(
     results: Results, style: str, *, width: int = 100, terminal: bool = False
 ) -> tuple[str, tuple[str, ...]]:
     """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render`."""
-    return tables.render(
-        results.frame, results.ties, results.footnotes, style, width=width, terminal=terminal
-    )
+    return tables.render(results.frame, results.ties, results.footnotes, style, width=width, terminal=terminal)
 
 
 def write_tables(results: Results, folder: Path) -> list[Path]:

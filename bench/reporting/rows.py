@@ -77,9 +77,7 @@ class Entry:
         """Every status other than ok, with how many seeds it took where there are several."""
         if self.seeds == 1:
             return "; ".join(self.failures)
-        return "; ".join(
-            f"{status} ({count} of {self.seeds} seeds)" for status, count in self.failures.items()
-        )
+        return "; ".join(f"{status} ({count} of {self.seeds} seeds)" for status, count in self.failures.items())
 
 
 @dataclass(frozen=True)

@@ -57,8 +57,7 @@ def looks(frame: pd.DataFrame) -> dict[Configured, Look]:
     """A look for each configured method, in the order in which the frame first names them; 28 differ."""
     found = frame.drop_duplicates(["method", "params"])
     heads = [
-        f"{title} ({params})" if params else str(title)
-        for title, params in zip(found.title, found.params, strict=True)
+        f"{title} ({params})" if params else str(title) for title, params in zip(found.title, found.params, strict=True)
     ]
     out = {}
     for k, (method, params, head) in enumerate(zip(found.method, found.params, heads, strict=True)):

@@ -2,9 +2,9 @@
 
 Everything here resamples cameras and seeds as if they were drawn independently from what the reader cares
 about. They are not quite: the cameras of one scene share edges, sub-scenes and the gauge, so their errors are
-correlated and the intervals are too narrow; a handful of seeds says little about the spread over seeds; and
-one scene says nothing about another. A tie is therefore trustworthy, a difference holds for these cameras
-under these seeds.
+correlated and the intervals are too narrow; a single seed says nothing of a method's luck, and a handful says
+little; and one scene says nothing about another. A tie is therefore trustworthy, a difference holds for these
+cameras under these seeds.
 """
 
 import itertools
@@ -23,7 +23,7 @@ Key = TypeVar("Key", bound=Hashable)
 RESAMPLES = 1000
 MIN_CAMERAS = 10  # a bootstrap over fewer says nothing
 MIN_COVERAGE = 0.95
-PRIOR_FREEDOM = 4
+PRIOR_FREEDOM = 3  # seeds
 FLOOR_DEG = 1e-6  # exact recoveries are not ranked by their rounding errors
 RESOLUTION = 0.005  # a ratio that printed figures would hardly show is not a difference
 SMALLEST = 1e-9  # standard deviations below this are rounding
@@ -137,6 +137,8 @@ def _told_apart(table: Floats, statistic: Statistic, same_cameras: bool, level: 
     by_seed = per_seed - per_seed[best]
     of_seeds, freedom = _seed_variance(np.delete(by_seed[:, np.isfinite(by_seed[0])], best, axis=0))
     nested = not same_cameras and freedom > 0
+    if nested:
+        critical = max(critical, _bonferroni(level, len(table)))
     told = np.zeros(len(table), dtype=bool)
     for method, variance in zip(np.delete(np.arange(len(table)), best), of_seeds, strict=True):
         resampled = 0.0 if nested else float((draws[:, method] - draws[:, best]).var())
@@ -150,23 +152,31 @@ def _log_of(centre: Centre) -> Centre:
     return lambda values, axis: np.log(np.maximum(centre(values, axis), FLOOR_DEG))
 
 
-def _seed_variance(differences: Floats) -> tuple[Floats, int]:
-    """Variance of the mean over seeds of each method's differences (methods, seeds), and its degrees of freedom.
+def _bonferroni(level: float, methods: int) -> float:
+    """Normal quantile for all pairs of methods; resamples of two or three seeds are bounded, and find less."""
+    from scipy.special import ndtri
+
+    return float(-ndtri(level / (methods * (methods - 1))))
+
+
+def _seed_variance(differences: Floats) -> tuple[Floats, float]:
+    """Variance of the mean over seeds of differences (methods, seeds), and its degrees of freedom.
 
     Two or three seeds hardly know their own variance, so it is drawn towards the median over the methods, as
-    if `PRIOR_FREEDOM` further seeds had shown that (moderated variances, Smyth 2004; there the prior is
-    fitted).
+    if up to `PRIOR_FREEDOM` further seeds had shown that (moderated variances, Smyth 2004, where the prior is
+    fitted; here it grows with the number of methods and seeds that it is taken from).
     """
     methods, seeds = differences.shape
     if seeds < 2 or methods == 0:
-        return np.zeros(methods), 0
+        return np.zeros(methods), 0.0
     variance = differences.var(axis=1, ddof=1)
-    freedom = seeds - 1 + PRIOR_FREEDOM
-    moderated = ((seeds - 1) * variance + PRIOR_FREEDOM * np.median(variance)) / freedom
+    prior = min(PRIOR_FREEDOM, (seeds - 1) * (methods - 1) / 2)
+    freedom = seeds - 1 + prior
+    moderated = ((seeds - 1) * variance + prior * np.median(variance)) / freedom
     return moderated / seeds, freedom
 
 
-def _threshold(critical: float, of_seeds: float, freedom: int, resampled: float, cameras: int) -> float:
+def _threshold(critical: float, of_seeds: float, freedom: float, resampled: float, cameras: int) -> float:
     """Largest difference that chance explains, from the normal quantile `critical`.
 
     A bootstrap over few units is too narrow. As in a t test, the variance is scaled by units / (units - 1)
