@@ -142,7 +142,7 @@ def resolve(
         On unknown names or parameters, or where the data that were asked for are malformed.
     """
     chosen = methods.select(suite.methods)
-    missing: dict[str, None] = {}
+    missing: dict[tuple[str, str], list[str]] = {}
     cells: list[Cell] = []
     for info, parameters in datasets.select(suite.datasets):
         if protocol is not None and "protocol" in info.defaults():
@@ -152,10 +152,18 @@ def resolve(
         for seed in range(suite.seeds):
             for source in configured.sources(data_dir, seed):
                 if isinstance(source, Missing):
-                    missing[f"{info.name}/{source.name} is not on disk; get it with: {source.command}"] = None
+                    names = missing.setdefault((info.name, source.command), [])
+                    names += [source.name] if source.name not in names else []
                 elif source.seeded or seed == 0:
                     cells += _cells_of(source, info, configured, label, seed, suite.seeds, chosen)
-    return Experiment(suite, tuple(cells), tuple(missing))
+    sentences = (_absence(dataset, names, command) for (dataset, command), names in missing.items())
+    return Experiment(suite, tuple(cells), tuple(sentences))
+
+
+def _absence(dataset: str, names: Sequence[str], command: str) -> str:
+    what = f"{len(names)} instances of {dataset} are" if len(names) > 1 else f"{dataset}/{names[0]} is"
+    which = f" ({', '.join(names)})" if len(names) > 1 else ""
+    return f"{what} not on disk{which}; get {'them' if len(names) > 1 else 'it'} with: {command}"
 
 
 def _cells_of(

@@ -87,9 +87,7 @@ def unpack(path: Path, archive: Archive, folder: Path, wanted: Collection[str], 
         try:
             _extract(path, Path(temporary), wanted, progress)
         except (tarfile.TarError, EOFError, zlib.error, gzip.BadGzipFile) as error:
-            raise InputError(
-                f"{path}: the archive is truncated or damaged ({error}); fetch it again"
-            ) from error
+            raise InputError(f"{path}: the archive is truncated or damaged ({error}); fetch it again") from error
         files = sorted(Path(temporary).glob("*/*"))
         if not files:
             raise InputError(f"{path}: the archive holds none of {', '.join(wanted)}")
@@ -158,9 +156,7 @@ def _extract(path: Path, folder: Path, wanted: Collection[str], progress: bool) 
 
     with (
         path.open("rb") as file,
-        tqdm(
-            total=path.stat().st_size, desc="unpack", unit="B", unit_scale=True, disable=not progress
-        ) as bar,
+        tqdm(total=path.stat().st_size, desc="unpack", unit="B", unit_scale=True, disable=not progress) as bar,
         gzip.open(file) as stream,
         tarfile.open(fileobj=stream, mode="r:") as archive,
     ):

@@ -87,9 +87,7 @@ class OneDSfM:
         for name in known if self.scene is None else [self.scene]:
             yield self._source(found[name]) if name in found else Missing(name, FETCH)
 
-    def fetch(
-        self, folder: Path | None = None, *, archive: Archive = OFFICIAL, progress: bool = True
-    ) -> Path:
+    def fetch(self, folder: Path | None = None, *, archive: Archive = OFFICIAL, progress: bool = True) -> Path:
         """Download the official archive into `folder`, by default the cache, and unpack what is needed of it.
 
         What is there already, and as it was unpacked, is not downloaded again; an interrupted download goes

@@ -40,7 +40,5 @@ def smallest_eigenvalue(problem: Problem, rotations: Floats) -> float:
     shift = float(abs(certificate).sum(axis=1).max())
     shifted = sparse.diags_array(np.full(3 * problem.n, shift)) - certificate
     start = np.random.default_rng(0).standard_normal(3 * problem.n)
-    largest = eigsh(
-        shifted, k=1, which="LA", v0=start, ncv=min(3 * problem.n, 40), tol=PRECISION, maxiter=5000
-    )[0]
+    largest = eigsh(shifted, k=1, which="LA", v0=start, ncv=min(3 * problem.n, 40), tol=PRECISION, maxiter=5000)[0]
     return float(shift - largest[0])

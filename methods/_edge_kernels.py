@@ -92,9 +92,7 @@ def divergence(edges: Ints, weights: Floats, vectors: Floats, degrees: Floats, s
 
 
 @_compiled
-def block_product(
-    edges: Ints, matrices: Floats, weights: Floats, diagonal: Floats, x: Floats, product: Floats
-) -> None:
+def block_product(edges: Ints, matrices: Floats, weights: Floats, diagonal: Floats, x: Floats, product: Floats) -> None:
     """Multiply the symmetric block matrix of the measurements with three columns, without forming it.
 
     Parameters

@@ -47,12 +47,8 @@ LOSSES: dict[str, Loss] = {
     "pseudo-huber": Loss(lambda x: np.sqrt(1 + x**2) - 1, lambda x: 1 / np.sqrt(1 + x**2), 1.345),
     "cauchy": Loss(lambda x: np.log1p(x**2) / 2, lambda x: 1 / (1 + x**2), 2.385),
     "welsch": Loss(lambda x: -np.expm1(-(x**2)) / 2, lambda x: np.exp(-(x**2)), 2.985),
-    "andrews": Loss(
-        lambda x: 1 - np.cos(np.minimum(x, np.pi)), lambda x: np.sinc(np.minimum(x / np.pi, 1)), 1.339
-    ),
-    "bisquare": Loss(
-        lambda x: (1 - np.maximum(1 - x**2, 0) ** 3) / 6, lambda x: np.maximum(1 - x**2, 0) ** 2, 4.685
-    ),
+    "andrews": Loss(lambda x: 1 - np.cos(np.minimum(x, np.pi)), lambda x: np.sinc(np.minimum(x / np.pi, 1)), 1.339),
+    "bisquare": Loss(lambda x: (1 - np.maximum(1 - x**2, 0) ** 3) / 6, lambda x: np.maximum(1 - x**2, 0) ** 2, 4.685),
     "fair": Loss(lambda x: x - np.log1p(x), lambda x: 1 / (1 + x), 1.4),
     "talwar": Loss(lambda x: np.minimum(x, 1) ** 2 / 2, lambda x: (x < 1).astype(float), 2.795),
 }

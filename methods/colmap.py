@@ -88,9 +88,7 @@ def _reconstruction(n: int) -> Any:
     reconstruction = pycolmap.Reconstruction()
     reconstruction.add_camera_with_trivial_rig(model)
     for image in range(1, n + 1):
-        reconstruction.add_image_with_trivial_frame(
-            pycolmap.Image(name=str(image), camera_id=1, image_id=image)
-        )
+        reconstruction.add_image_with_trivial_frame(pycolmap.Image(name=str(image), camera_id=1, image_id=image))
     return reconstruction
 
 
@@ -99,14 +97,10 @@ def _pose_graph(problem: Problem) -> Any:
     import pycolmap
 
     matches = (
-        np.ones(problem.m, int)
-        if problem.weights is None
-        else np.maximum(np.rint(problem.weights), 1).astype(int)
+        np.ones(problem.m, int) if problem.weights is None else np.maximum(np.rint(problem.weights), 1).astype(int)
     )
     graph = pycolmap.PoseGraph()
-    for (i, j), rotation, count in zip(
-        problem.edges.tolist(), problem.rotations, matches.tolist(), strict=True
-    ):
+    for (i, j), rotation, count in zip(problem.edges.tolist(), problem.rotations, matches.tolist(), strict=True):
         relative = pycolmap.Rigid3d(pycolmap.Rotation3d(np.ascontiguousarray(rotation.T)), np.zeros(3))
         edge = pycolmap.PoseGraphEdge(cam2_from_cam1=relative, num_matches=count, valid=True)
         graph.add_edge(i + 1, j + 1, edge)

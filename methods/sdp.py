@@ -115,14 +115,10 @@ def _dual(problem: Problem) -> "cvxpy.Problem":
     triangles = cvxpy.Variable(6 * problem.n)
     blocks = cvxpy.reshape(spread @ triangles, (size, size), order="F")
     measurements = problem.block_matrix() / problem.degree.mean()
-    return cvxpy.Problem(
-        cvxpy.Minimize(cvxpy.sum(triangles[np.flatnonzero(~mirrored)])), [blocks - measurements >> 0]
-    )
+    return cvxpy.Problem(cvxpy.Minimize(cvxpy.sum(triangles[np.flatnonzero(~mirrored)])), [blocks - measurements >> 0])
 
 
-def _solve_from_spectral(
-    relaxation: "cvxpy.Problem", problem: Problem, eps: float, max_iterations: int
-) -> None:
+def _solve_from_spectral(relaxation: "cvxpy.Problem", problem: Problem, eps: float, max_iterations: int) -> None:
     """Solve by SCS, called with cvxpy's data because cvxpy can only start it from its own last solution."""
     import cvxpy
     import scs
@@ -153,9 +149,7 @@ def _solve_from_spectral(
 
 def _solve_by_clarabel(relaxation: "cvxpy.Problem", eps: float, max_iterations: int) -> None:
     with _status_checked_later():
-        relaxation.solve(
-            solver="CLARABEL", tol_gap_abs=eps, tol_gap_rel=eps, tol_feas=eps, max_iter=max_iterations
-        )
+        relaxation.solve(solver="CLARABEL", tol_gap_abs=eps, tol_gap_rel=eps, tol_feas=eps, max_iter=max_iterations)
 
 
 def _status_checked_later() -> Any:

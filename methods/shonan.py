@@ -97,9 +97,7 @@ class Shonan:
         residual = 2 * np.sqrt(2) * np.sin(problem.residuals(rotations) / 2) / sigma
         weights = HUBER / np.maximum(residual, HUBER)
         cost = np.where(residual <= HUBER, 0.5 * residual**2, HUBER * (residual - 0.5 * HUBER)).sum()
-        return Estimate(
-            rotations, edge_weights=weights, stop_reason="local optimum on SO(3)", cost=float(cost)
-        )
+        return Estimate(rotations, edge_weights=weights, stop_reason="local optimum on SO(3)", cost=float(cost))
 
     def _averaging(self, problem: Problem, sigma: float, *, certify: bool) -> Any:
         """GTSAM's problem; sigma is the standard deviation of a chordal residual."""

@@ -55,12 +55,8 @@ class Spectral:
         rotations, found = spectral_rotations(problem, normalised=self.normalised)
         if found.error <= PRECISE:
             return Estimate(rotations, iterations=found.products, stop_reason="eigenvectors converged")
-        note = (
-            f"the eigenvectors are known to {np.degrees(found.error):.1e} degrees only: the gap is too small"
-        )
-        return Estimate(
-            rotations, iterations=found.products, stop_reason="eigenvectors not separated", notes=(note,)
-        )
+        note = f"the eigenvectors are known to {np.degrees(found.error):.1e} degrees only: the gap is too small"
+        return Estimate(rotations, iterations=found.products, stop_reason="eigenvectors not separated", notes=(note,))
 
 
 def spectral_rotations(
@@ -113,9 +109,7 @@ def compile_and_load() -> None:
         spectral_rotations(Problem(n, edges, np.tile(np.eye(3), (len(edges), 1, 1))))
 
 
-def _eigenspace(
-    problem: Problem, weights: Floats, diagonal: Floats, start: Floats, tolerance: float
-) -> Eigenspace:
+def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, start: Floats, tolerance: float) -> Eigenspace:
     if problem.n <= SMALL:
         return dense_eigenspace(problem.block_matrix(weights, diagonal).toarray())
     if _bandwidth(problem) < NARROW * problem.n:
@@ -139,9 +133,7 @@ def _bandwidth(problem: Problem) -> int:
     return int(np.abs(np.diff(position[problem.edges], axis=1)).max())
 
 
-def _inverse(
-    problem: Problem, weights: Floats, diagonal: Floats, start: Floats
-) -> Callable[[Floats], Floats]:
+def _inverse(problem: Problem, weights: Floats, diagonal: Floats, start: Floats) -> Callable[[Floats], Floats]:
     """Products with the inverse of (shift - G), the shift being an upper bound on the eigenvalues of G.
 
     The blocks of G are rotations times positive weights, so that its eigenvalues are at most those of the
@@ -158,7 +150,5 @@ def _inverse(
         bound = (image / x).max()
         x = image / image.max()
     shifted = -problem.block_matrix(weights, diagonal - (1 + SHIFT) * bound)
-    factor = splu(
-        shifted.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+    factor = splu(shifted.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return lambda x: factor.solve(np.ascontiguousarray(x))

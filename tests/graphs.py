@@ -21,9 +21,7 @@ def grid_edges(rows: int, columns: int) -> Ints:
     return np.concatenate([across, down]).astype(np.int32)
 
 
-def simulated(
-    edges: Ints, noise_deg: float = 0.0, outliers: float = 0.0, seed: int = 0
-) -> tuple[Problem, Floats]:
+def simulated(edges: Ints, noise_deg: float = 0.0, outliers: float = 0.0, seed: int = 0) -> tuple[Problem, Floats]:
     """Measurements on a graph, a share of them Haar-uniform, and the true rotations (n, 3, 3)."""
     rng = np.random.default_rng(seed)
     n, m = int(edges.max()) + 1, len(edges)

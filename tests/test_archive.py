@@ -10,10 +10,10 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from bench.datasets._archive import Archive
-from bench.datasets.one_dsfm import FILES, OneDSfM
 from scenes import write_scene
 
+from bench.datasets._archive import Archive
+from bench.datasets.one_dsfm import FILES, OneDSfM
 from bench.errors import InputError
 
 INSIDE = "home/wilsonkl/projects/SfM_Init/datasets"
@@ -188,9 +188,7 @@ def test_a_link_in_place_of_a_file_is_refused(server: Server, tmp_path: Path, ki
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
-def test_a_truncated_archive_leaves_nothing_half_unpacked(
-    server: Server, tmp_path: Path, share: float
-) -> None:
+def test_a_truncated_archive_leaves_nothing_half_unpacked(server: Server, tmp_path: Path, share: float) -> None:
     server.data = server.data[: int(share * len(server.data))]
     assert "truncated or damaged" in refusal(server, tmp_path / "out")
     assert tree(tmp_path / "out") == ["datasets.tar.gz"]

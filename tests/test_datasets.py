@@ -5,16 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.datasets import _folders
-from bench.datasets._statistics import hardness
-from bench.datasets.erdos_renyi import ErdosRenyi
-from bench.datasets.one_dsfm import FETCH, SCENES, OneDSfM
-from bench.datasets.pose_graph import PoseGraph, propagated
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import write_scene
 
 from bench import so3
+from bench.datasets import _folders
+from bench.datasets._statistics import hardness
+from bench.datasets.erdos_renyi import ErdosRenyi
+from bench.datasets.one_dsfm import FETCH, SCENES, OneDSfM
+from bench.datasets.pose_graph import PoseGraph, propagated
 from bench.errors import InputError
 from bench.problem import Instance, Problem
 from bench.registry import Dataset, Missing, Source
@@ -73,9 +73,7 @@ def test_noise_and_outliers_have_the_distributions_of_the_paper() -> None:
     assert truth is not None
     assert instance.outliers is not None
     i, j = problem.edges.T
-    noise = (
-        np.swapaxes(truth[i] @ np.swapaxes(truth[j], 1, 2), 1, 2) @ problem.rotations
-    )  # R_ij N_ij, on the right
+    noise = np.swapaxes(truth[i] @ np.swapaxes(truth[j], 1, 2), 1, 2) @ problem.rotations  # R_ij N_ij, on the right
     vectors = np.degrees(so3.log(noise))
     inliers, outliers = vectors[~instance.outliers], vectors[instance.outliers]
     angles = np.linalg.norm(inliers, axis=1)
@@ -85,9 +83,7 @@ def test_noise_and_outliers_have_the_distributions_of_the_paper() -> None:
     axes = inliers / angles[:, None]
     assert np.abs(axes.T @ axes / len(axes) - np.eye(3) / 3).max() < 0.02
     # Haar: density of the angle (1 - cos) / pi, mean pi/2 + 2/pi
-    assert np.mean(np.linalg.norm(outliers, axis=1)) == pytest.approx(
-        np.degrees(np.pi / 2 + 2 / np.pi), abs=2
-    )
+    assert np.mean(np.linalg.norm(outliers, axis=1)) == pytest.approx(np.degrees(np.pi / 2 + 2 / np.pi), abs=2)
     share = problem.m / (200 * 199 / 2)
     assert share == pytest.approx(0.5, abs=4 * np.sqrt(0.25 / (200 * 199 / 2)))
 
@@ -104,10 +100,7 @@ def test_the_seed_decides_and_nothing_else() -> None:
     one, same, other = (load(ErdosRenyi(n=30), seed=seed) for seed in (0, 0, 1))
     np.testing.assert_array_equal(one.problem.rotations, same.problem.rotations)
     assert one.revision == same.revision != other.revision
-    assert (
-        one.problem.edges.shape != other.problem.edges.shape
-        or (one.problem.edges != other.problem.edges).any()
-    )
+    assert one.problem.edges.shape != other.problem.edges.shape or (one.problem.edges != other.problem.edges).any()
     assert the_source(ErdosRenyi()).seeded
 
 
@@ -189,9 +182,7 @@ def test_scenes_that_are_not_on_disk_come_with_the_command(tmp_path: Path) -> No
     assert Missing("Alamo", FETCH) in sources
 
 
-def test_the_users_folder_comes_first(
-    tmp_path: Path, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_users_folder_comes_first(tmp_path: Path, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The named folder, then the environment variable, then the downloads."""
     places = [elsewhere / "1dsfm", tmp_path / "variable", tmp_path / "named"]
     cameras = []
@@ -255,9 +246,7 @@ def test_ellis_island_is_the_published_problem(real_data: Path) -> None:
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize(
-    ("scene", "count", "published"), [("Madrid_Metropolis", 176, 341), ("NYC_Library", 274, 332)]
-)
+@pytest.mark.parametrize(("scene", "count", "published"), [("Madrid_Metropolis", 176, 341), ("NYC_Library", 274, 332)])
 def test_scenes_with_partial_truth_say_so(real_data: Path, scene: str, count: int, published: int) -> None:
     instance = load(OneDSfM(scene=scene), real_data)
     assert instance.problem.n == count

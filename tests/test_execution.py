@@ -75,7 +75,7 @@ def test_a_grandchild_does_not_outlive_a_child_that_ended_well(faulty_plugin: Pa
     ended, _, _ = solve(faulty_plugin, "orphan", mark=str(mark))
     assert ended.text == "ok"
     deadline = time.monotonic() + 5
-    while not mark.exists() and time.monotonic() < deadline:
+    while mark.exists() and is_running(int(mark.read_text())) and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not mark.exists() or not is_running(int(mark.read_text()))
 

@@ -347,9 +347,7 @@ def test_a_damaged_file_is_read_or_refused(
     good = GOOD_FILES[name]
     start = data.draw(st.integers(0, len(good)))
     stop = data.draw(st.integers(start, min(len(good), start + 8)))
-    filling = data.draw(
-        st.one_of(st.binary(max_size=8), st.sampled_from([b"nan", b"-", b"9" * 25, b"\n", b"1e308"]))
-    )
+    filling = data.draw(st.one_of(st.binary(max_size=8), st.sampled_from([b"nan", b"-", b"9" * 25, b"\n", b"1e308"])))
     path = tmp_path_factory.mktemp("damaged") / name
     path.write_bytes(good[:start] + filling + good[stop:])
     message = str(path)

@@ -6,14 +6,14 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
+
+from bench import so3
 from bench.methods import _edge_kernels
 from bench.methods._laplacian import LaplacianSolver
 from bench.methods._losses import LOSSES
 from bench.methods.l1_irls import L1IRLS, LossName
 from bench.methods.spectral import Spectral
-from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
-
-from bench import so3
 from bench.problem import Ints
 
 RNG = np.random.default_rng(0)  # the method draws nothing from it
@@ -120,9 +120,7 @@ def test_the_estimate_says_how_it_came_about() -> None:
     assert estimate.cost < stopped.cost
 
 
-@pytest.mark.parametrize(
-    "parameters", [{"sigma_deg": 0.0}, {"tolerance_deg": -1.0}, {"irls_iterations": -1}], ids=str
-)
+@pytest.mark.parametrize("parameters", [{"sigma_deg": 0.0}, {"tolerance_deg": -1.0}, {"irls_iterations": -1}], ids=str)
 def test_impossible_parameters_are_refused(parameters: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(parameters))):
         L1IRLS(**parameters)  # type: ignore[arg-type]

@@ -5,14 +5,14 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from graphs import errors_deg, random_edges, simulated, transformed
+
+from bench import so3
 from bench.datasets.one_dsfm import OneDSfM
 from bench.methods._certificate import chordal_cost, smallest_eigenvalue
 from bench.methods.colmap import Colmap
 from bench.methods.sdp import SDP
 from bench.methods.shonan import Shonan
-from graphs import errors_deg, random_edges, simulated, transformed
-
-from bench import so3
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import Source
 
@@ -69,9 +69,7 @@ def test_the_first_order_solver_is_accurate_without_its_start(monkeypatch: pytes
 @EVERY_METHOD
 def test_a_loop_error_is_shared_by_the_loop(method: Peer) -> None:
     """R_ij = R_i R_j^T of turns by 10, 10 and 26 degrees: 6 degrees too many, 2 for every edge."""
-    problem = Problem(
-        3, np.array([[0, 1], [1, 2], [0, 2]]), np.array([about_z(10), about_z(10), about_z(26)])
-    )
+    problem = Problem(3, np.array([[0, 1], [1, 2], [0, 2]]), np.array([about_z(10), about_z(10), about_z(26)]))
     rotations = method.solve(problem, RNG).rotations
     relative = rotations[[0, 1, 0]] @ np.swapaxes(rotations[[1, 2, 2]], -1, -2)
     expected = np.array([about_z(12), about_z(12), about_z(24)])
@@ -96,9 +94,7 @@ def test_the_seed_does_not_matter(method: Peer) -> None:
 @pytest.mark.parametrize("outliers", [0.0, 0.2])
 def test_the_certified_methods_find_one_optimum(outliers: float) -> None:
     problem, _ = simulated(SMALL, noise_deg=8, outliers=outliers)
-    first, *others = (
-        m.solve(problem, RNG) for m in (SDP(eps=1e-7), SDP(solver="clarabel", eps=1e-8), Shonan())
-    )
+    first, *others = (m.solve(problem, RNG) for m in (SDP(eps=1e-7), SDP(solver="clarabel", eps=1e-8), Shonan()))
     for estimate in (first, *others):
         assert estimate.cost == pytest.approx(first.cost, rel=1e-4)
         assert estimate.cost == chordal_cost(problem, estimate.rotations)

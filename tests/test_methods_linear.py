@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from bench.methods._eigenspace import leading_eigenspace
-from bench.methods.spanning_tree import SpanningTree, tree_edges
-from bench.methods.spectral import Spectral, spectral_rotations
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
 from bench import so3
+from bench.methods._eigenspace import leading_eigenspace
+from bench.methods.spanning_tree import SpanningTree, tree_edges
+from bench.methods.spectral import Spectral, spectral_rotations
 from bench.problem import Floats, Ints, Problem
 
 RNG = np.random.default_rng(0)  # the methods here draw nothing from it

@@ -71,4 +71,4 @@ def new(
         encoding="utf-8",
     )
     typer.echo(f"wrote {path}; next:\n  python -m bench check method {name} --plugin {path}")
-    typer.echo(f"  python -m bench run --plugin {path} -m {name} -m spectral")
+    typer.echo(f"  python -m bench run --plugin {path} -m {name} -m l1-irls -d erdos-renyi")

@@ -37,9 +37,7 @@ def read_npz(path: Path) -> GraphFile:
 def _load(path: Path) -> dict[str, NDArray[Any]]:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {
-                name: archive[name] for name in ("edges", "rotations", "weights", "n") if name in archive
-            }
+            arrays = {name: archive[name] for name in ("edges", "rotations", "weights", "n") if name in archive}
     except Exception as error:  # a damaged zip or header may fail in any of a dozen ways
         raise InputError(
             f"{path}: cannot be read as a NumPy archive of plain arrays; write it with numpy.savez"
@@ -55,21 +53,15 @@ def _checked(path: Path, name: str, array: NDArray[Any], kinds: str, shape: tupl
     numbers = "numbers" if "f" in kinds else "whole numbers"
     if array.dtype.kind not in kinds:
         raise InputError(f"{path}: '{name}' holds {array.dtype}; it must hold {numbers}")
-    if array.ndim != len(shape) or any(
-        want not in (-1, has) for want, has in zip(shape, array.shape, strict=True)
-    ):
-        raise InputError(
-            f"{path}: '{name}' must have shape {str(shape).replace('-1', 'm')}, not {array.shape}"
-        )
+    if array.ndim != len(shape) or any(want not in (-1, has) for want, has in zip(shape, array.shape, strict=True)):
+        raise InputError(f"{path}: '{name}' must have shape {str(shape).replace('-1', 'm')}, not {array.shape}")
     return array
 
 
 def _weights(path: Path, array: NDArray[Any], m: int) -> NDArray[np.float64]:
     weights = _checked(path, "weights", array, "iuf", (m,)).astype(np.float64)
     if (row := first(~(np.isfinite(weights) & (weights > 0)))) is not None:
-        raise InputError(
-            f"{path}: row {row}: the weight is {weights[row]:g}; weights must be positive numbers"
-        )
+        raise InputError(f"{path}: row {row}: the weight is {weights[row]:g}; weights must be positive numbers")
     return weights
 
 

@@ -49,9 +49,7 @@ def read_folder(folder: Path) -> GraphFile:
     cameras = _component(folder, table)
     kept = np.flatnonzero(np.isin(table.ids, cameras).all(axis=1))
     if len(kept) == 0:
-        raise InputError(
-            f"{folder / COMPONENT}: no edge joins two of these cameras in {EDGES}; {_SAME_SCENE}"
-        )
+        raise InputError(f"{folder / COMPONENT}: no edge joins two of these cameras in {EDGES}; {_SAME_SCENE}")
     outside = len(table.ids) - len(kept)
     notes = (f"{outside} edges have an end outside {COMPONENT} and are left out",) if outside else ()
 
@@ -121,9 +119,7 @@ def _component(folder: Path, edges: Table) -> Ids:
     table = parse(folder / COMPONENT, rows(folder / COMPONENT), 1, 0, "one camera id")
     cameras = distinct(table)
     if (row := first(~np.isin(table.ids[:, 0], edges.ids))) is not None:
-        raise InputError(
-            f"{table.where(row)}: camera {table.ids[row, 0]} has no edge in {EDGES}; {_SAME_SCENE}"
-        )
+        raise InputError(f"{table.where(row)}: camera {table.ids[row, 0]} has no edge in {EDGES}; {_SAME_SCENE}")
     return cameras
 
 
@@ -132,11 +128,7 @@ def _bundle_size(path: Path) -> int:
     if lines[0].split() != ["#", "Bundle", "file", "v0.3"]:
         raise InputError(f"{path}:1: {shown(lines[0].strip())} is not the header '# Bundle file v0.3'")
     words = lines[1].split() if len(lines) > 1 else []
-    if (
-        len(words) != 2
-        or not all(word.isdecimal() and len(word) < 10 for word in words)
-        or int(words[0]) == 0
-    ):
+    if len(words) != 2 or not all(word.isdecimal() and len(word) < 10 for word in words) or int(words[0]) == 0:
         raise InputError(f"{path}:2: this line must hold the number of cameras and the number of points")
     return int(words[0])
 

@@ -15,7 +15,7 @@ Ties = Mapping[Place, Set[Configured]]
 
 OK = "ok"
 TIE_LEGEND = (
-    "not told apart from the best median (paired bootstrap over cameras and seeds, level 5 %, "
+    "not told apart from the best median, nor by the mean (paired bootstrap over cameras and seeds, level 5 %, "
     "all pairs corrected; cameras of a scene are correlated)"
 )
 

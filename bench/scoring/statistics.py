@@ -73,26 +73,32 @@ def seed_half_width(values: Sequence[float], level: float = 0.95) -> float:
 
 def tie_groups(
     errors: Mapping[Key, Floats],
-    statistic: Statistic = "median",
+    statistics: Sequence[Statistic] = ("median", "mean"),
     *,
     same_cameras: bool = True,
     level: float = 0.05,
 ) -> set[Key]:
     """Methods that cannot be told apart from the best one on an instance, the best included.
 
-    Methods are compared by the logarithm of the statistic, averaged over seeds, so that a hard seed weighs no
+    The best is the best by the first statistic. A method leaves its group where it is worse by any of them: a
+    median alone is blind to the half of the cameras above it. The level is shared among the statistics.
+
+    Methods are compared by the logarithm of a statistic, averaged over seeds, so that a hard seed weighs no
     more than an easy one. A paired bootstrap: each resample draws the same seeds and cameras for all methods.
     A method is told apart from the best when its studentized difference exceeds the 1 - `level` quantile of
     the largest studentized difference between *any* two methods in the centred bootstrap distribution
     (single-step max-t, Romano and Wolf 2005). Taking all pairs pays both for the number of comparisons and
-    for having picked the best by looking.
+    for having picked the best by looking. Where there are several seeds the quantile is at least
+    Bonferroni's, because resamples of two or three seeds are bounded.
 
     Parameters
     ----------
     errors
         For each method (k,) or (s, k) errors in degrees on the same k cameras and s seeds, NaN where not
         scored. Methods that failed altogether are left out or all NaN.
-    statistic, same_cameras
+    statistics
+        What is compared.
+    same_cameras
         As in `confidence_interval`.
     level
         Probability of telling apart, anywhere in the table's row, methods that are equally good. In
@@ -116,13 +122,14 @@ def tie_groups(
     table = np.where(np.isfinite(table).all(axis=0), table, np.nan)
     if np.isfinite(table[0]).sum(axis=1).max() < MIN_CAMERAS:
         return set(competing)
-    apart = _told_apart(table, statistic, same_cameras, level)
+    centres = [_log_of(_CENTRES[statistic]) for statistic in statistics]
+    best = int(np.argmin(np.nanmean(_scores(table, centres[0]), axis=1)))
+    apart = np.any([_told_apart(table, best, c, same_cameras, level / len(centres)) for c in centres], axis=0)
     return {key for key, told in zip(competing, apart, strict=True) if not told}
 
 
-def _told_apart(table: Floats, statistic: Statistic, same_cameras: bool, level: float) -> NDArray[np.bool_]:
-    """Whether each method (axis 0 of the table) is told apart from the best."""
-    centre = _log_of(_CENTRES[statistic])
+def _told_apart(table: Floats, best: int, centre: Centre, same_cameras: bool, level: float) -> NDArray[np.bool_]:
+    """Whether each method (axis 0 of the table) is told apart from, and worse than, the best."""
     per_seed = _scores(table, centre)
     scores = np.nanmean(per_seed, axis=1)
     draws = _replicates(table, centre, same_cameras)
@@ -132,16 +139,15 @@ def _told_apart(table: Floats, statistic: Statistic, same_cameras: bool, level: 
         if difference.std() > SMALLEST:
             largest = np.maximum(largest, np.abs(difference - difference.mean()) / difference.std())
     critical = float(np.quantile(largest, 1 - level))
-    best = int(np.argmin(scores))
     behind = scores - scores[best]
     by_seed = per_seed - per_seed[best]
     of_seeds, freedom = _seed_variance(np.delete(by_seed[:, np.isfinite(by_seed[0])], best, axis=0))
-    nested = not same_cameras and freedom > 0
-    if nested:
+    several = freedom > 0
+    if several:
         critical = max(critical, _bonferroni(level, len(table)))
     told = np.zeros(len(table), dtype=bool)
     for method, variance in zip(np.delete(np.arange(len(table)), best), of_seeds, strict=True):
-        resampled = 0.0 if nested else float((draws[:, method] - draws[:, best]).var())
+        resampled = 0.0 if several and not same_cameras else float((draws[:, method] - draws[:, best]).var())
         cameras = int(np.isfinite(table[best]).any(axis=0).sum())
         threshold = _threshold(critical, float(variance), freedom, resampled, cameras)
         told[method] = behind[method] > max(threshold, RESOLUTION)
@@ -153,7 +159,7 @@ def _log_of(centre: Centre) -> Centre:
 
 
 def _bonferroni(level: float, methods: int) -> float:
-    """Normal quantile for all pairs of methods; resamples of two or three seeds are bounded, and find less."""
+    """Normal quantile for the differences of all pairs of methods."""
     from scipy.special import ndtri
 
     return float(-ndtri(level / (methods * (methods - 1))))
