@@ -125,3 +125,15 @@ def test_a_disconnected_graph_is_solved_on_its_largest_component(faulty_plugin: 
     assert np.isnan(estimate.rotations[:2]).all()
     assert np.isfinite(estimate.rotations[2:]).all()
     assert report["notes"] == ["disconnected graph: solved on its largest component, 3 of 5 cameras"]
+
+
+def test_a_requirement_that_kills_its_importer_costs_its_own_row(
+    faulty_plugin: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "deadly_library.py").write_text("import os\nos.abort()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    text = faulty_plugin.read_text().replace('title="Faulty"', 'title="Faulty", requires=("deadly_library",)')
+    faulty_plugin.write_text(text)
+    ended, _, _ = solve(faulty_plugin, "fine")
+    assert ended.text == "crashed(the fork server died while importing what the method requires)"

@@ -11,7 +11,7 @@ from typing import Any
 from bench import provenance
 from bench.execution import outcome
 from bench.execution.child import RESULT_FILE, Request
-from bench.execution.launch import LOG_FILE, Launcher
+from bench.execution.launch import LOG_FILE, Launcher, LaunchError
 from bench.execution.outcome import Outcome
 from bench.execution.supervise import Limits, supervise
 
@@ -29,8 +29,11 @@ def execute(
     """
     start = time.monotonic()
     folder = Path(request.folder)
-    ended = supervise(launcher.start(request, requires), limits, stop)
     report: dict[str, Any] = {}
+    try:
+        ended = supervise(launcher.start(request, requires), limits, stop)
+    except LaunchError as error:
+        ended = Outcome(outcome.CRASHED, str(error))
     if isinstance(ended, int):
         try:
             report = json.loads((folder / RESULT_FILE).read_text(encoding="utf-8"))

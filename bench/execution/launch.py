@@ -24,7 +24,12 @@ THREAD_VARIABLES = (
     "NUMBA_NUM_THREADS",
 )
 CAN_FORK = hasattr(os, "fork") and sys.platform != "darwin"  # macOS libraries do not survive a fork
+SERVER_GONE = "the fork server died while importing what the method requires"
 START_TIMEOUT_S = 120.0  # the first job of a server waits for its imports
+
+
+class LaunchError(RuntimeError):
+    """The child could not be started."""
 
 
 class Child(Protocol):
@@ -48,7 +53,13 @@ class Launcher:
         self.lock = threading.Lock()
 
     def start(self, request: Request, requires: tuple[str, ...]) -> Child:
-        """Start the job; its output goes to `LOG_FILE` in the request's folder."""
+        """Start the job; its output goes to `LOG_FILE` in the request's folder.
+
+        Raises
+        ------
+        LaunchError
+            Where the fork server hangs or dies while it imports what the method requires.
+        """
         if not CAN_FORK:
             return _FreshInterpreter(request, self.environment)
         with self.lock:
@@ -99,9 +110,9 @@ class _ForkedChild:
         try:
             self.pid = self.messages.get(timeout=START_TIMEOUT_S)
         except queue.Empty:
-            raise RuntimeError(f"the fork server did not answer within {START_TIMEOUT_S:g} s") from None
+            raise LaunchError(f"the fork server did not answer within {START_TIMEOUT_S:g} s") from None
         if self.pid < 0:
-            raise RuntimeError("the fork server died while importing what the method requires")
+            raise LaunchError(SERVER_GONE)
 
     def wait(self, timeout: float | None) -> int | None:
         try:
@@ -135,6 +146,8 @@ class _ForkServer:
     def start(self, request: Request) -> _ForkedChild:
         child = _ForkedChild()
         with self.lock:
+            if not self.alive:
+                raise LaunchError(SERVER_GONE)
             self.count += 1
             self.children[self.count] = child
             message = {
@@ -142,21 +155,24 @@ class _ForkServer:
                 "request": asdict(request),
                 "log": str(Path(request.folder, LOG_FILE)),
             }
-            self.socket.sendall(json.dumps(message).encode() + b"\n")
+            with contextlib.suppress(BrokenPipeError):  # the reader tells the child that the server is gone
+                self.socket.sendall(json.dumps(message).encode() + b"\n")
         child.wait_for_pid()
         return child
 
     def _read(self) -> None:
-        with self.socket.makefile("rb") as lines:
+        # A server that dies with unread messages resets the connection instead of closing it.
+        with self.socket.makefile("rb") as lines, contextlib.suppress(ConnectionResetError):
             for line in lines:
                 message = json.loads(line)
                 if "pid" in message:
                     self.children[message["id"]].messages.put(message["pid"])
                 else:
                     self.children.pop(message["id"]).messages.put(message["exit"])
-        self.alive = False
-        for child in self.children.values():
-            child.messages.put(self.SERVER_DIED)
+        with self.lock:
+            self.alive = False
+            for child in self.children.values():
+                child.messages.put(self.SERVER_DIED)
 
     def close(self) -> None:
         with contextlib.suppress(OSError):  # the server may have gone first

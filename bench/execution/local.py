@@ -82,10 +82,7 @@ class LocalEngine:
                 threads=self.threads,
                 folder=str(work.resolve()),
             )
-            try:
-                ended, report = execute(request, requires, self.launcher, self.limits, self.stop)
-            except RuntimeError as error:  # the fork server could not be started
-                ended, report = Outcome(outcome.CRASHED, str(error)), {}
+            ended, report = execute(request, requires, self.launcher, self.limits, self.stop)
             record = record_of(asdict(job), requires, self.limits, ended, report)
             self.store.add_record(job.id, record, work / ESTIMATE_FILE if ended.kind == outcome.OK else None)
         return cell, record

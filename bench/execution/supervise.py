@@ -56,18 +56,22 @@ def _end(child: Child) -> None:
     """End the child, and whatever it left behind."""
     family = _family(child.pid)
     if family and child.wait(0.001) is None:
-        _signal(child.pid, family, signal.SIGTERM)
+        _signal_group(child.pid, "SIGTERM")
+        for process in family:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.terminate()
         child.wait(GRACE_S)
-    _signal(child.pid, [*family, *_family(child.pid)], signal.SIGKILL)
-
-
-def _signal(pid: int, family: list[psutil.Process], number: signal.Signals) -> None:
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        if hasattr(os, "killpg"):
-            os.killpg(pid, number)
-    for process in family:
+    _signal_group(child.pid, "SIGKILL")
+    for process in [*family, *_family(child.pid)]:
         with contextlib.suppress(psutil.NoSuchProcess):
-            process.send_signal(number)
+            process.kill()
+
+
+def _signal_group(pid: int, name: str) -> None:
+    """Signal the process group that the child leads, where the system has such groups."""
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(pid, getattr(signal, name))
 
 
 def _family(pid: int) -> list[psutil.Process]:
