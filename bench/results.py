@@ -1,6 +1,6 @@
 """Score what a run has stored: the table of rows, the per-camera errors behind it, ties and footnotes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -53,8 +53,8 @@ class _Collected:
     notes: dict[str, None] = field(default_factory=dict)
 
 
-def score(store: Store, rule: str = "l1", protocol: str | None = None) -> Results:
-    """Score every job that was ever planned in a store; nothing is run.
+def score(store: Store, rule: str = "l1", protocol: str | None = None, jobs: Sequence[Job] | None = None) -> Results:
+    """Score what is stored of a run; nothing is run.
 
     Parameters
     ----------
@@ -64,12 +64,14 @@ def score(store: Store, rule: str = "l1", protocol: str | None = None) -> Result
         One of `bench.scoring.alignment.RULES`.
     protocol
         Keep the instances of one protocol only, and those of datasets that have none.
+    jobs
+        Only these; by default every job that was ever planned.
     """
     import pandas as pd
 
     collected = _Collected()
     instances: dict[str, Instance] = {}
-    for job in store.jobs():
+    for job in store.jobs() if jobs is None else jobs:
         key = job.instance_key
         if key not in instances:
             instances[key] = store.instance(key)

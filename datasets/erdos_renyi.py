@@ -47,6 +47,10 @@ class ErdosRenyi:
     outlier_model
         ``haar``, or ``authors``: the rotation nearest to a matrix with entries uniform on [0, 1], as in
         their code, which is biased towards one part of SO(3).
+    clairvoyant
+        Leave out the edges that are outliers, which only the truth can tell: the same graph and the same
+        measurements otherwise, so that errors on it say what is lost by having to find the outliers. What is
+        left need not be connected.
     """
 
     n: int = 100
@@ -54,6 +58,7 @@ class ErdosRenyi:
     noise_deg: float = 5.0
     outliers: float = 0.4
     outlier_model: Literal["haar", "authors"] = "haar"
+    clairvoyant: bool = False
 
     def __post_init__(self) -> None:
         if self.n < 2:
@@ -82,6 +87,8 @@ class ErdosRenyi:
         outliers = np.zeros(m, dtype=bool)
         outliers[rng.choice(m, round(self.outliers * m), replace=False)] = True
         rotations[outliers] = self._outlying(rng, int(outliers.sum()))
+        if self.clairvoyant:
+            edges, rotations, outliers = edges[~outliers], rotations[~outliers], outliers[~outliers]
         problem = Problem(self.n, edges, rotations)
         return Instance(
             problem,
@@ -90,6 +97,7 @@ class ErdosRenyi:
             outliers=outliers,
             source="simulated: Tejus et al. 2023, section IV-A",
             revision=identity,
+            notes=("the true outliers are left out, which no method can know",) if self.clairvoyant else (),
             statistics=_statistics.statistics(problem),
         )
 
@@ -123,6 +131,8 @@ class ErdosRenyi:
             parts.append(f"outliers{self.outliers}")
         if self.outlier_model != ErdosRenyi.outlier_model:
             parts.append(f"{self.outlier_model}-outliers")
+        if self.clairvoyant:
+            parts.append("clairvoyant")
         return "-".join(parts)
 
     def _revision(self, seed: int) -> str:
