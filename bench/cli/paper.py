@@ -60,7 +60,7 @@ def paper(
         frame = chosen.compare(published, computed)
         _print(tables.scene_grid(chosen, frame, computed, rule), frame, format)
     else:
-        from bench.reporting.curves import draw
+        from bench.reporting.bands import draw
 
         points = chosen.points(computed)
         notes = tables.point_notes(chosen, points, computed)
