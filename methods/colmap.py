@@ -14,7 +14,7 @@ from bench.registry import method
     title="COLMAP",
     cite="pan2024",
     requires=("pycolmap",),
-    install="python -m pip install 'rotsync-bench[colmap]'",
+    install="python -m pip install 'pycolmap>=4'",
     robust=True,
     invariant_to_deg=0.5,  # its iterations stop at a mean step of 1e-3 rad
 )
