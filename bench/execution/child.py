@@ -113,11 +113,12 @@ def _solve(request: Request, result: dict[str, Any]) -> Outcome:
     memory = _PeakMemory()
     start = time.perf_counter()
     answer = method.solve(solved, rng)
-    result["solve_s"] = time.perf_counter() - start
+    elapsed = time.perf_counter() - start
     result["peak_mib"] = memory.peak_mib()
 
     estimate = answer if isinstance(answer, Estimate) else Estimate(answer)
-    wrong = _what_is_wrong(solved, estimate)
+    result |= {"solve_s": elapsed - estimate.conversion_s, "conversion_s": estimate.conversion_s}
+    wrong = _what_is_wrong(solved, estimate, elapsed)
     if wrong:
         return Outcome(outcome.INVALID_OUTPUT, wrong)
     if not connected:
@@ -132,7 +133,7 @@ def _info(request: Request) -> registry.Info:
     return next(info for info in registry.infos(module, "method") if info.name == request.method)
 
 
-def _what_is_wrong(problem: Problem, estimate: Estimate) -> str:
+def _what_is_wrong(problem: Problem, estimate: Estimate, elapsed: float) -> str:
     """Say why the estimate cannot be scored, or nothing."""
     rotations = estimate.rotations
     if not isinstance(rotations, np.ndarray) or rotations.shape != (problem.n, 3, 3):
@@ -152,6 +153,8 @@ def _what_is_wrong(problem: Problem, estimate: Estimate) -> str:
         return f"{bad.sum()} of {len(solved)} matrices are not rotations to {ROTATION_TOLERANCE:g}"
     if estimate.edge_weights is not None and np.shape(estimate.edge_weights) != (problem.m,):
         return f"edge_weights must have shape ({problem.m},), not {np.shape(estimate.edge_weights)}"
+    if not 0 <= estimate.conversion_s <= elapsed:
+        return f"conversion_s is {estimate.conversion_s:g} s, which is not within the time that solve took"
     return ""
 
 
@@ -216,6 +219,7 @@ def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
                 Checkpoint(rotations=state, **facts)
                 for state, facts in zip(states, scalars.get("checkpoints", ()), strict=True)
             ),
+            conversion_s=scalars.get("conversion_s", 0.0),
             notes=tuple(scalars.get("notes", ())),
         )
 
