@@ -101,6 +101,8 @@ class Faulty:
             print("x" * 3_000_000)
         elif self.fault == "weights":
             return Estimate(identity, edge_weights=np.ones(1))
+        elif self.fault == "timeless":
+            return Estimate(identity, conversion_s=1e6)
         elif self.fault == "random":
             return so3.random(rng, problem.n)
         return identity
