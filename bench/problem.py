@@ -226,6 +226,9 @@ class Estimate:
         Smallest eigenvalue of the certificate matrix (optimal when it is not below zero up to tolerance), or None.
     checkpoints
         For curves over iterations.
+    conversion_s
+        Seconds of `solve` that went into converting to and from a library's own types. The time in tables is
+        without them; they are stored beside it.
     notes
         Every fallback taken, and what else a reader of the row must know.
     """
@@ -237,6 +240,7 @@ class Estimate:
     cost: float | None = None
     certificate: float | None = None
     checkpoints: tuple[Checkpoint, ...] = ()
+    conversion_s: float = 0.0
     notes: tuple[str, ...] = ()
 
 

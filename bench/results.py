@@ -10,6 +10,7 @@ from bench import selection
 from bench.execution import outcome
 from bench.problem import Floats, Instance
 from bench.scoring.errors import camera_errors, edge_metrics, summary
+from bench.scoring.oracle import ORACLE, Curve, curve
 from bench.scoring.statistics import tie_groups
 from bench.store import Job, Store
 
@@ -36,6 +37,8 @@ class Results:
         What a reader must know: notes on instances, and data that were not found.
     alignment
         The rule that removed the gauge.
+    curves
+        For each place and each configured method that gave checkpoints, the errors along them, one curve a seed.
     """
 
     frame: "pd.DataFrame"
@@ -43,6 +46,7 @@ class Results:
     ties: Mapping[Place, set[Configured]]
     footnotes: tuple[str, ...]
     alignment: str
+    curves: Mapping[Place, Mapping[Configured, Sequence[Curve]]]
 
 
 @dataclass
@@ -51,9 +55,17 @@ class _Collected:
     errors: dict[Place, dict[Configured, list[Floats]]] = field(default_factory=dict)
     instances_of: dict[Place, set[str]] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
+    curves: dict[Place, dict[Configured, list[Curve]]] = field(default_factory=dict)
 
 
-def score(store: Store, rule: str = "l1", protocol: str | None = None, jobs: Sequence[Job] | None = None) -> Results:
+def score(
+    store: Store,
+    rule: str = "l1",
+    protocol: str | None = None,
+    jobs: Sequence[Job] | None = None,
+    *,
+    oracle: bool = False,
+) -> Results:
     """Score what is stored of a run; nothing is run.
 
     Parameters
@@ -66,6 +78,9 @@ def score(store: Store, rule: str = "l1", protocol: str | None = None, jobs: Seq
         Keep the instances of one protocol only, and those of datasets that have none.
     jobs
         Only these; by default every job that was ever planned.
+    oracle
+        Add a row for the best checkpoint of every estimate that has checkpoints. Its parameters end in ``oracle``,
+        and it takes no part in ties.
     """
     import pandas as pd
 
@@ -76,7 +91,7 @@ def score(store: Store, rule: str = "l1", protocol: str | None = None, jobs: Seq
         if key not in instances:
             instances[key] = store.instance(key)
         if protocol in (None, instances[key].protocol) or instances[key].protocol == "all":
-            _collect(collected, store, job, instances[key], rule)
+            _collect(collected, store, job, instances[key], rule, oracle)
     plans = store.plans()
     footnotes = [*collected.notes, *(plans[-1].missing if plans else ())]
     ties = {
@@ -87,10 +102,10 @@ def score(store: Store, rule: str = "l1", protocol: str | None = None, jobs: Seq
         for place, by_method in collected.errors.items()
     }
     errors = {place: {m: tuple(e) for m, e in by_method.items()} for place, by_method in collected.errors.items()}
-    return Results(pd.DataFrame(collected.rows), errors, ties, tuple(footnotes), rule)
+    return Results(pd.DataFrame(collected.rows), errors, ties, tuple(footnotes), rule, collected.curves)
 
 
-def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, rule: str) -> None:
+def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, rule: str, oracle: bool) -> None:
     dataset = selection.parse(job.dataset).name
     place = (dataset, job.instance, instance.protocol)
     method = (job.method, selection.format_parameters(dict(job.parameters)))
@@ -100,12 +115,15 @@ def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, 
     record = store.record(job.id) or {"outcome": outcome.NOT_RUN, "status": outcome.NOT_RUN}
     errors = np.full(instance.problem.n, np.nan)
     scores: dict[str, Any] = {"n_solved": 0}
+    along = None
     if record["outcome"] == outcome.OK:
-        rotations = store.estimate(job.id).rotations
+        estimate = store.estimate(job.id)
+        rotations = estimate.rotations
         scores["n_solved"] = int(np.isfinite(rotations).all(axis=(1, 2)).sum())
         scores |= edge_metrics(instance.problem, rotations, instance.truth)
         if instance.truth is not None:
             errors = camera_errors(rotations, instance.truth, rule)
+            along = curve(estimate, instance.truth, rule)
     if instance.truth is not None:
         collected.errors.setdefault(place, {}).setdefault(method, []).append(errors)
     collected.rows.append(
@@ -122,6 +140,7 @@ def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, 
             **summary(errors),
             "solve_s": record.get("solve_s"),
             "peak_mib": record.get("peak_mib"),
+            "conversion_s": record.get("conversion_s"),
             "n_cameras": instance.problem.n,
             "n_edges": instance.problem.m,
             **scores,
@@ -131,6 +150,29 @@ def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, 
             "job": job.id,
         }
     )
+    if along is not None:
+        collected.curves.setdefault(place, {}).setdefault(method, []).append(along)
+        if oracle:
+            collected.rows.append(_oracle_row(collected.rows[-1], along))
+
+
+def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
+    """The row of an estimate's best checkpoint; what only its end has is left out."""
+    pick = along.oracle
+    count = len(along.iterations)
+    absent = dict.fromkeys(
+        ("peak_mib", "cost", "certificate", *(k for k in row if k.startswith(("residual", "cost_"))))
+    )
+    return {
+        **row,
+        **absent,
+        **summary(along.errors[pick]),
+        "params": ",".join(filter(None, [row["params"], ORACLE])),
+        "solve_s": along.seconds[pick],
+        "iterations": int(along.iterations[pick]),
+        "stop_reason": ORACLE,
+        "notes": f"{ORACLE}: checkpoint {pick + 1} of {count}, picked by the smallest error against ground truth",
+    }
 
 
 def _stacked(errors: list[Floats]) -> Floats:

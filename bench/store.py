@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 
+from bench.arrays import load_estimate, load_problem, save_problem
 from bench.errors import InputError
-from bench.execution.child import load_estimate, load_problem, save_problem
 from bench.problem import Estimate, Instance
 
 SCHEMA = 1

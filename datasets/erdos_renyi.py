@@ -1,19 +1,20 @@
 """Random graphs with noise and outliers, as in section IV-A of the founding paper."""
 
-import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from bench import seeds, so3
 from bench.errors import InputError
-from bench.problem import Floats, Instance, Ints, Problem
+from bench.problem import Instance, Ints, Problem
 from bench.registry import Source, dataset
 
-from . import _statistics
+from ._folders import revision
+from ._measurements import CODE, Measurements, OutlierModel
+from ._noise import Noise
+from ._statistics import statistics
 
 _ATTEMPTS = 1000
 
@@ -21,7 +22,7 @@ _ATTEMPTS = 1000
 @dataset("erdos-renyi", title="Erdős–Rényi", cite="tejus2023")
 @dataclass(frozen=True)
 class ErdosRenyi:
-    """A connected Erdős–Rényi graph with Gaussian noise on its edges and a fraction of outliers.
+    """A connected Erdős–Rényi graph with noise on its edges and a fraction of outliers.
 
     Tejus et al. (2023), section IV-A. Absolute rotations come from Euler angles; every pair is an edge with
     probability 1 - `missing`, drawn again until the graph is connected; a fraction of the edges are
@@ -41,12 +42,16 @@ class ErdosRenyi:
     missing
         Expected fraction of the pairs without an edge, 1 - p.
     noise_deg
-        Standard deviation of the noise angle, degrees.
+        Scale of the noise: for ``paper`` the standard deviation of its angle, for the others that of each
+        component of its rotation vector, degrees.
     outliers
         Fraction of the edges.
     outlier_model
         ``haar``, or ``authors``: the rotation nearest to a matrix with entries uniform on [0, 1], as in
         their code, which is biased towards one part of SO(3).
+    noise
+        ``paper``, or one of two models for which a Cramér-Rao bound exists: ``tangent`` (a Gaussian rotation
+        vector) and ``langevin``; the formulas are in ``_noise.py``.
     clairvoyant
         Leave out the edges that are outliers, which only the truth can tell: the same graph and the same
         measurements otherwise, so that errors on it say what is lost by having to find the outliers. What is
@@ -57,7 +62,8 @@ class ErdosRenyi:
     missing: float = 0.5
     noise_deg: float = 5.0
     outliers: float = 0.4
-    outlier_model: Literal["haar", "authors"] = "haar"
+    outlier_model: OutlierModel = "haar"
+    noise: Noise = "paper"
     clairvoyant: bool = False
 
     def __post_init__(self) -> None:
@@ -65,10 +71,7 @@ class ErdosRenyi:
             raise ValueError(f"n must be at least 2, not {self.n}")
         if not 0 <= self.missing < 1:
             raise ValueError(f"missing must be at least 0 and below 1, not {self.missing}")
-        if not 0 <= self.noise_deg <= 180:
-            raise ValueError(f"noise_deg must be from 0 to 180, not {self.noise_deg}")
-        if not 0 <= self.outliers <= 1:
-            raise ValueError(f"outliers must be from 0 to 1, not {self.outliers}")
+        Measurements.of(self)
 
     def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source]:
         """One instance for each seed."""
@@ -79,14 +82,7 @@ class ErdosRenyi:
         rng = seeds.stream(seed, "data", "erdos-renyi")
         truth = so3.from_euler(rng.uniform(-np.pi, np.pi, (self.n, 3)))
         edges = self._connected_graph(rng)
-        m = len(edges)
-        i, j = edges.T
-        angles = np.radians(self.noise_deg) * rng.standard_normal((m, 1))
-        noise = so3.exp(angles * so3.random_axes(rng, m))
-        rotations = truth[i] @ np.swapaxes(truth[j], -1, -2) @ noise
-        outliers = np.zeros(m, dtype=bool)
-        outliers[rng.choice(m, round(self.outliers * m), replace=False)] = True
-        rotations[outliers] = self._outlying(rng, int(outliers.sum()))
+        rotations, outliers = Measurements.of(self).simulate(truth, edges, rng)
         if self.clairvoyant:
             edges, rotations, outliers = edges[~outliers], rotations[~outliers], outliers[~outliers]
         problem = Problem(self.n, edges, rotations)
@@ -95,10 +91,10 @@ class ErdosRenyi:
             truth,
             name=self._name(),
             outliers=outliers,
-            source="simulated: Tejus et al. 2023, section IV-A",
+            source=f"simulated: Tejus et al. 2023, section IV-A; {self.noise} noise",
             revision=identity,
             notes=("the true outliers are left out, which no method can know",) if self.clairvoyant else (),
-            statistics=_statistics.statistics(problem),
+            statistics=statistics(problem),
         )
 
     def _connected_graph(self, rng: np.random.Generator) -> Ints:
@@ -117,27 +113,11 @@ class ErdosRenyi:
             "connected; choose a smaller missing or a larger n"
         )
 
-    def _outlying(self, rng: np.random.Generator, count: int) -> Floats:
-        if self.outlier_model == "authors":
-            return so3.project(rng.random((count, 3, 3)))
-        return so3.random(rng, count)
-
     def _name(self) -> str:
         """``n100-missing0.5``, then every other parameter that is not at its default."""
-        parts = [f"n{self.n}", f"missing{self.missing}"]
-        if self.noise_deg != ErdosRenyi.noise_deg:
-            parts.append(f"noise{self.noise_deg}")
-        if self.outliers != ErdosRenyi.outliers:
-            parts.append(f"outliers{self.outliers}")
-        if self.outlier_model != ErdosRenyi.outlier_model:
-            parts.append(f"{self.outlier_model}-outliers")
-        if self.clairvoyant:
-            parts.append("clairvoyant")
-        return "-".join(parts)
+        parts = [f"n{self.n}", f"missing{self.missing}", *Measurements.of(self).label()]
+        return "-".join([*parts, "clairvoyant"] if self.clairvoyant else parts)
 
     def _revision(self, seed: int) -> str:
         """Hash of the code that generates, the parameters and the seed."""
-        digest = hashlib.sha256(f"{self!r} {seed}".encode())
-        for source in (__file__, so3.__file__, seeds.__file__):
-            digest.update(Path(source).read_bytes())
-        return digest.hexdigest()
+        return revision([Path(__file__), *CODE], repr(self), str(seed))

@@ -8,13 +8,15 @@ import numpy as np
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
+from ._stopwatch import Stopwatch
+
 
 @method(
     "colmap",
     title="COLMAP",
     cite="pan2024",
     requires=("pycolmap",),
-    install="python -m pip install 'rotsync-bench[colmap]'",
+    install="python -m pip install 'pycolmap>=4'",
     robust=True,
     invariant_to_deg=0.5,  # its iterations stop at a mean step of 1e-3 rad
 )
@@ -58,16 +60,19 @@ class Colmap:
         import pycolmap
 
         pycolmap.logging.minloglevel = pycolmap.logging.ERROR.value
-        reconstruction = _reconstruction(problem.n)
-        solved = pycolmap.run_rotation_averaging(
-            self._options(seed=int(rng.integers(2**31))), _pose_graph(problem), reconstruction, []
-        )
+        conversion = Stopwatch()
+        with conversion.running():
+            reconstruction, graph = _reconstruction(problem.n), _pose_graph(problem)
+        options = self._options(seed=int(rng.integers(2**31)))
+        solved = pycolmap.run_rotation_averaging(options, graph, reconstruction, [])
         if not solved:
             raise RuntimeError(
                 f"COLMAP's rotation averaging with weight_type={self.weight_type} reported failure; "
                 "its poses are unusable"
             )
-        return Estimate(_rotations(reconstruction, problem.n), stop_reason="COLMAP reported success")
+        with conversion.running():
+            rotations = _rotations(reconstruction, problem.n)
+        return Estimate(rotations, stop_reason="COLMAP reported success", conversion_s=conversion.seconds)
 
     def _options(self, seed: int) -> Any:
         import pycolmap

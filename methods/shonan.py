@@ -9,6 +9,7 @@ from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
 from ._certificate import chordal_cost, smallest_eigenvalue
+from ._stopwatch import Stopwatch
 from .spectral import spectral_rotations
 
 HUBER = 1.345  # GTSAM's threshold, in units of sigma
@@ -69,38 +70,51 @@ class Shonan:
         return self._huber(problem) if self.loss == "huber" else self._l2(problem)
 
     def _l2(self, problem: Problem) -> Estimate:
-        start = _values(spectral_rotations(problem)[0])
+        found = spectral_rotations(problem)[0]
+        conversion = Stopwatch()
+        with conversion.running():
+            start, measurements = _values(found), _measurements(problem, sigma=1.0)
         notes: tuple[str, ...] = ()
         try:
-            values, _ = self._averaging(problem, sigma=1.0, certify=True).run(start, 3, self.p_max)
+            values, _ = self._averaging(measurements, certify=True).run(start, 3, self.p_max)
             reason = "certified by GTSAM"
         except RuntimeError as error:
             if "did not converge" not in str(error):
                 raise
-            values, _ = self._averaging(problem, sigma=1.0, certify=False).run(start, 3, 3)
+            values, _ = self._averaging(measurements, certify=False).run(start, 3, 3)
             reason = "local optimum on SO(3)"
             notes = (f"not certified up to p={self.p_max}: a local optimum on SO(3) is returned",)
-        rotations = _rotations(values, problem.n)
+        with conversion.running():
+            rotations = _rotations(values, problem.n)
         return Estimate(
             rotations,
             stop_reason=reason,
             cost=chordal_cost(problem, rotations),
             certificate=smallest_eigenvalue(problem, rotations),
+            conversion_s=conversion.seconds,
             notes=notes,
         )
 
     def _huber(self, problem: Problem) -> Estimate:
         sigma = np.radians(self.sigma_deg)
-        start = _values(spectral_rotations(problem)[0])
-        values, _ = self._averaging(problem, sigma, certify=False).run(start, 3, 3)
-        rotations = _rotations(values, problem.n)
+        found = spectral_rotations(problem)[0]
+        conversion = Stopwatch()
+        with conversion.running():
+            start, measurements = _values(found), _measurements(problem, sigma)
+        values, _ = self._averaging(measurements, certify=False).run(start, 3, 3)
+        with conversion.running():
+            rotations = _rotations(values, problem.n)
         residual = 2 * np.sqrt(2) * np.sin(problem.residuals(rotations) / 2) / sigma
-        weights = HUBER / np.maximum(residual, HUBER)
         cost = np.where(residual <= HUBER, 0.5 * residual**2, HUBER * (residual - 0.5 * HUBER)).sum()
-        return Estimate(rotations, edge_weights=weights, stop_reason="local optimum on SO(3)", cost=float(cost))
+        return Estimate(
+            rotations,
+            edge_weights=HUBER / np.maximum(residual, HUBER),
+            stop_reason="local optimum on SO(3)",
+            cost=float(cost),
+            conversion_s=conversion.seconds,
+        )
 
-    def _averaging(self, problem: Problem, sigma: float, *, certify: bool) -> Any:
-        """GTSAM's problem; sigma is the standard deviation of a chordal residual."""
+    def _averaging(self, measurements: list[Any], *, certify: bool) -> Any:
         import gtsam
 
         descent = gtsam.LevenbergMarquardtParams.CeresDefaults()
@@ -108,12 +122,18 @@ class Shonan:
         parameters = gtsam.ShonanAveragingParameters3(descent)
         parameters.setUseHuber(self.loss == "huber")
         parameters.setCertifyOptimality(certify)
-        noise = gtsam.noiseModel.Isotropic.Sigma(3, sigma)
-        measurements = [
-            gtsam.BinaryMeasurementRot3(i, j, gtsam.Rot3(rotation), noise)
-            for (i, j), rotation in zip(problem.edges.tolist(), problem.rotations, strict=True)
-        ]
         return gtsam.ShonanAveraging3(measurements, parameters)
+
+
+def _measurements(problem: Problem, sigma: float) -> list[Any]:
+    """GTSAM's measurements; sigma is the standard deviation of a chordal residual."""
+    import gtsam
+
+    noise = gtsam.noiseModel.Isotropic.Sigma(3, sigma)
+    return [
+        gtsam.BinaryMeasurementRot3(i, j, gtsam.Rot3(rotation), noise)
+        for (i, j), rotation in zip(problem.edges.tolist(), problem.rotations, strict=True)
+    ]
 
 
 def _values(rotations: Floats) -> Any:

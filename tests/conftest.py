@@ -21,6 +21,14 @@ def real_data() -> Path:
 
 
 @pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """No data but what a test names: no environment variable, and an empty download cache, which is returned."""
+    monkeypatch.delenv("ROTSYNC_DATA_DIR", raising=False)
+    monkeypatch.setattr("pooch.os_cache", lambda project: str(tmp_path / "cache" / project))
+    return tmp_path / "cache" / "rotsync-bench"
+
+
+@pytest.fixture
 def faulty_plugin(tmp_path: Path) -> Path:
     """A plug-in file with a method that fails in the way it is told to, and a small seeded dataset."""
     path = tmp_path / "faulty.py"
@@ -93,6 +101,8 @@ class Faulty:
             print("x" * 3_000_000)
         elif self.fault == "weights":
             return Estimate(identity, edge_weights=np.ones(1))
+        elif self.fault == "timeless":
+            return Estimate(identity, conversion_s=1e6)
         elif self.fault == "random":
             return so3.random(rng, problem.n)
         return identity

@@ -1,11 +1,12 @@
-"""Small scenes in the layout of 1DSfM, made for the tests."""
+"""Small scenes in the layout of 1DSfM, made for the tests, and the way to load any instance."""
 
 from pathlib import Path
 
 import numpy as np
 
 from bench import so3
-from bench.problem import Floats
+from bench.problem import Floats, Instance
+from bench.registry import Dataset, Source
 
 UNREGISTERED = "1 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
 
@@ -37,3 +38,18 @@ def write_scene(folder: Path, images: int = 9, unregistered: tuple[int, ...] = (
     points = "1 2 3\n255 255 255\n2 0 1 0.5 0.5 1 1 0.5 0.5\n"
     (folder / "gt_bundle.out").write_text(f"# Bundle file v0.3\n{images} 1\n{''.join(cameras)}{points}")
     return rotations
+
+
+def the_source(dataset: Dataset, data_dir: Path | None = None, seed: int = 0) -> Source:
+    """Return the one instance of a dataset, not loaded."""
+    (source,) = dataset.sources(data_dir, seed)
+    assert isinstance(source, Source)
+    return source
+
+
+def load(dataset: Dataset, data_dir: Path | None = None, seed: int = 0) -> Instance:
+    """Load the one instance of a dataset."""
+    source = the_source(dataset, data_dir, seed)
+    instance = source.load()
+    assert (instance.name, instance.revision) == (source.name, source.revision)
+    return instance

@@ -19,7 +19,7 @@ CONFIGURATIONS = [
     "colmap",
     "dmf-synch[depth=[2,3,5]]",
     "dmf-synch[loss=[l1,l2]]",
-    "dmf-synch[form=dense]",
+    "dmf-synch[preset=dense]",
 ]
 
 

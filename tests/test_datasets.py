@@ -7,38 +7,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scenes import write_scene
+from scenes import load, the_source, write_scene
 
 from bench import so3
 from bench.datasets import _folders
+from bench.datasets._noise import Noise
 from bench.datasets._statistics import hardness
 from bench.datasets.erdos_renyi import ErdosRenyi
 from bench.datasets.one_dsfm import FETCH, SCENES, OneDSfM
 from bench.datasets.pose_graph import PoseGraph, propagated
 from bench.errors import InputError
-from bench.problem import Instance, Problem
-from bench.registry import Dataset, Missing, Source
+from bench.problem import Problem
+from bench.registry import Missing, Source
 
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """No data but what a test names: an empty download cache, and no environment variable."""
-    monkeypatch.delenv(_folders.VARIABLE, raising=False)
-    monkeypatch.setattr("pooch.os_cache", lambda project: str(tmp_path / "cache" / project))
-    return tmp_path / "cache" / "rotsync-bench"
-
-
-def the_source(dataset: Dataset, data_dir: Path | None = None, seed: int = 0) -> Source:
-    (source,) = dataset.sources(data_dir, seed)
-    assert isinstance(source, Source)
-    return source
-
-
-def load(dataset: Dataset, data_dir: Path | None = None, seed: int = 0) -> Instance:
-    source = the_source(dataset, data_dir, seed)
-    instance = source.load()
-    assert (instance.name, instance.revision) == (source.name, source.revision)
-    return instance
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 # --- erdos-renyi -------------------------------------------------------------------------------------
@@ -113,6 +95,8 @@ def test_parameter_sets_have_their_own_name_and_revision() -> None:
         {"noise_deg": 2.0},
         {"outliers": 0.1},
         {"outlier_model": "authors"},
+        {"noise": "tangent"},
+        {"noise": "langevin"},
     ]
     sources = [the_source(dataclasses.replace(default, **change)) for change in changes]  # type: ignore[arg-type]
     assert sources[0].name == "n100-missing0.5"
@@ -133,6 +117,16 @@ def test_parameter_sets_have_their_own_name_and_revision() -> None:
 def test_parameters_out_of_range_are_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=name):
         ErdosRenyi(**{name: value})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("noise", ["tangent", "langevin"])
+def test_other_noise_has_three_components(noise: Noise) -> None:
+    instance = load(ErdosRenyi(n=100, noise_deg=4.0, noise=noise))
+    assert instance.outliers is not None
+    residuals = np.degrees(instance.problem.residuals(instance.truth))[~instance.outliers]  # type: ignore[arg-type]
+    assert np.mean(residuals**2) == pytest.approx(3 * 4.0**2, rel=0.06)
+    assert instance.name == f"n100-missing0.5-noise4.0-{noise}-noise"
+    assert f"{noise} noise" in instance.source
 
 
 def test_a_graph_that_is_never_connected_is_refused() -> None:

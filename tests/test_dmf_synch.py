@@ -136,20 +136,20 @@ def test_the_dense_step_is_autograds(loss: str) -> None:
 
 def test_the_dense_form_is_stopped_before_it_fits_the_outliers() -> None:
     problem, truth = simulated(random_edges(30, 0.8), noise_deg=2, outliers=0.3)
-    honest = DMFSynch(form="dense", checkpoint_every=100, iterations=6000).solve(problem, rng())
+    honest = DMFSynch(preset="dense", checkpoint_every=100, iterations=6000).solve(problem, rng())
     assert honest.iterations is not None
     assert honest.iterations < 6000
     assert "began to fit outliers" in honest.stop_reason
     by_error = [errors_deg(c.rotations, truth).mean() for c in honest.checkpoints]
     assert errors_deg(honest.rotations, truth).mean() < min(by_error) + 0.3
-    late = DMFSynch(form="dense", stop="limit", iterations=6000).solve(problem, rng())
+    late = DMFSynch(preset="dense", stop="limit", iterations=6000).solve(problem, rng())
     assert late.stop_reason == "iteration limit"
     assert errors_deg(late.rotations, truth).mean() > 2 * errors_deg(honest.rotations, truth).mean()
 
 
 def test_the_seed_decides_the_dense_start() -> None:
     problem, _ = simulated(random_edges(8, 0.5))
-    method = DMFSynch(form="dense", iterations=3, stop="limit")
+    method = DMFSynch(preset="dense", iterations=3, stop="limit")
     first, again, other = (method.solve(problem, rng(seed)).rotations for seed in (5, 5, 6))
     assert np.array_equal(first, again)
     assert not np.allclose(first, other)
@@ -157,7 +157,7 @@ def test_the_seed_decides_the_dense_start() -> None:
 
 def test_checkpoints_tell_iteration_seconds_and_singular_values() -> None:
     problem, _ = simulated(random_edges(8, 0.5))
-    for method in (DMFSynch(iterations=250), DMFSynch(form="dense", iterations=250, checkpoint_every=100)):
+    for method in (DMFSynch(iterations=250), DMFSynch(preset="dense", iterations=250, checkpoint_every=100)):
         checkpoints: tuple[Checkpoint, ...] = method.solve(problem, rng()).checkpoints
         assert [c.iteration for c in checkpoints][:3] == [0, 100, 200]
         assert all(np.diff([c.seconds for c in checkpoints]) > 0)
@@ -168,9 +168,9 @@ def test_checkpoints_tell_iteration_seconds_and_singular_values() -> None:
 @pytest.mark.parametrize(
     ("selection", "complaint"),
     [
-        ("dmf-synch[init_scale=1]", "'init_scale' has no meaning for form=thin"),
-        ("dmf-synch[form=dense,start=random]", "'start' has no meaning for form=dense"),
-        ("dmf-synch[form=dense,loss=l1/2]", "not l1/2"),
+        ("dmf-synch[init_scale=1]", "'init_scale' has no meaning for preset=thin"),
+        ("dmf-synch[preset=dense,start=random]", "'start' has no meaning for preset=dense"),
+        ("dmf-synch[preset=dense,loss=l1/2]", "not l1/2"),
         ("dmf-synch[depth=1]", "'depth' must be at least 2, not 1"),
         ("dmf-synch[lr=0]", "'lr' must be above zero"),
         ("dmf-synch[momentum=1]", "'momentum' must be"),
@@ -194,3 +194,13 @@ def test_ellis_island(depth: int, loss: str, median: float, real_data: Path) -> 
     errors = errors_deg(estimate.rotations, instance.truth)
     assert np.median(errors) < median
     assert errors.mean() < 2.95
+
+
+def test_the_paper_preset_is_the_dense_recipe_to_its_end():
+    problem, _ = simulated(random_edges(6, 0.8))
+    paper = DMFSynch(preset="paper", iterations=2500).solve(problem, rng())
+    assert [c.iteration for c in paper.checkpoints] == [0, 1000, 2000, 2500]
+    assert paper.iterations == 2500
+    assert DMFSynch(preset="paper").layers == 5
+    same = DMFSynch(preset="dense", depth=5, stop="limit", iterations=2500).solve(problem, rng())
+    np.testing.assert_array_equal(paper.rotations, same.rotations)

@@ -40,6 +40,7 @@ def solve(plugin: Path, fault: str, limits: Limits = LIMITS, mark: str = "", see
         ("one-inf", "invalid-output(1 cameras have entries that are not finite)"),
         ("scaled", "invalid-output(3 of 3 matrices are not rotations to 1e-06)"),
         ("reflected", "invalid-output(3 of 3 matrices are not rotations to 1e-06)"),
+        ("timeless", "invalid-output(conversion_s is 1e+06 s, which is not within the time that solve took)"),
         ("weights", "invalid-output(edge_weights must have shape (3,), not (1,))"),
     ],
 )

@@ -138,7 +138,7 @@ def results(**medians: dict[str, float]) -> Results:
         for instance, by_method in medians.items()
         for method, median in by_method.items()
     ]
-    return Results(pd.DataFrame(rows), {}, {}, (), "l1")
+    return Results(pd.DataFrame(rows), {}, {}, (), "l1", {})
 
 
 def test_differences_and_marks_are_those_worked_out_by_hand(layout_file: Path) -> None:

@@ -2,6 +2,7 @@
 
 import shutil
 import sys
+from typing import Annotated
 
 import typer
 
@@ -12,6 +13,9 @@ def table(
     run: RunFolder,
     align: AlignOption = Align.L1,
     protocol: ProtocolOption = None,
+    oracle: Annotated[
+        bool, typer.Option("--oracle", help="Add the checkpoint that ground truth likes best, labelled so.")
+    ] = False,
     format: Format = Format.CONSOLE,
 ) -> None:
     """Print the table of a run; nothing is run. Notes go to standard error."""
@@ -19,7 +23,7 @@ def table(
     from bench.results import score
     from bench.store import Store
 
-    results = score(Store.open(run_folder(run)), align.value, protocol.value if protocol else None)
+    results = score(Store.open(run_folder(run)), align.value, protocol.value if protocol else None, oracle=oracle)
     width = shutil.get_terminal_size((100, 24)).columns
     text, footnotes = render_table(results, format.value, width=width, terminal=sys.stdout.isatty())
     typer.echo(text, nl=not text.endswith("\n"))

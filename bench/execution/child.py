@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 
 from bench import registry
+from bench.arrays import load_problem, save_estimate
 from bench.execution import outcome
 from bench.execution.outcome import Outcome
-from bench.problem import ROTATION_TOLERANCE, Checkpoint, Estimate, Floats, Problem, Skipped
+from bench.problem import ROTATION_TOLERANCE, Estimate, Floats, Problem, Skipped
 from bench.seeds import stream
 
 ESTIMATE_FILE = "estimate.npz"
@@ -35,7 +36,7 @@ class Request:
     Parameters
     ----------
     problem
-        Path of an ``.npz`` written by `save_problem`.
+        Path of an ``.npz`` written by `bench.arrays.save_problem`.
     origin, method, parameters
         Module (or file) of the plug-in, its name, and the parameters given.
     seed
@@ -53,22 +54,6 @@ class Request:
     seed: int
     threads: int
     folder: str
-
-
-def save_problem(path: Path, problem: Problem) -> None:
-    """Write a problem as uncompressed ``.npz``."""
-    arrays: dict[str, Any] = {"n": problem.n, "edges": problem.edges, "rotations": problem.rotations}
-    if problem.weights is not None:
-        arrays["weights"] = problem.weights
-    with path.open("wb") as file:
-        np.savez(file, **arrays)
-
-
-def load_problem(path: Path) -> Problem:
-    """Read what `save_problem` wrote."""
-    with np.load(path, allow_pickle=False) as data:
-        weights = data.get("weights", None)
-        return Problem(int(data["n"]), data["edges"], data["rotations"], weights)
 
 
 def run(request: Request) -> None:
@@ -113,11 +98,12 @@ def _solve(request: Request, result: dict[str, Any]) -> Outcome:
     memory = _PeakMemory()
     start = time.perf_counter()
     answer = method.solve(solved, rng)
-    result["solve_s"] = time.perf_counter() - start
+    elapsed = time.perf_counter() - start
     result["peak_mib"] = memory.peak_mib()
 
     estimate = answer if isinstance(answer, Estimate) else Estimate(answer)
-    wrong = _what_is_wrong(solved, estimate)
+    result |= {"solve_s": elapsed - estimate.conversion_s, "conversion_s": estimate.conversion_s}
+    wrong = _what_is_wrong(solved, estimate, elapsed)
     if wrong:
         return Outcome(outcome.INVALID_OUTPUT, wrong)
     if not connected:
@@ -132,7 +118,7 @@ def _info(request: Request) -> registry.Info:
     return next(info for info in registry.infos(module, "method") if info.name == request.method)
 
 
-def _what_is_wrong(problem: Problem, estimate: Estimate) -> str:
+def _what_is_wrong(problem: Problem, estimate: Estimate, elapsed: float) -> str:
     """Say why the estimate cannot be scored, or nothing."""
     rotations = estimate.rotations
     if not isinstance(rotations, np.ndarray) or rotations.shape != (problem.n, 3, 3):
@@ -152,6 +138,8 @@ def _what_is_wrong(problem: Problem, estimate: Estimate) -> str:
         return f"{bad.sum()} of {len(solved)} matrices are not rotations to {ROTATION_TOLERANCE:g}"
     if estimate.edge_weights is not None and np.shape(estimate.edge_weights) != (problem.m,):
         return f"edge_weights must have shape ({problem.m},), not {np.shape(estimate.edge_weights)}"
+    if not 0 <= estimate.conversion_s <= elapsed:
+        return f"conversion_s is {estimate.conversion_s:g} s, which is not within the time that solve took"
     return ""
 
 
@@ -188,36 +176,6 @@ def _scalars(estimate: Estimate) -> dict[str, Any]:
             for c in estimate.checkpoints
         ],
     }
-
-
-def save_estimate(path: Path, estimate: Estimate) -> None:
-    """Write the arrays of an estimate, float64 and unrounded, as ``.npz``."""
-    arrays: dict[str, Any] = {"rotations": np.asarray(estimate.rotations, dtype=np.float64)}
-    if estimate.edge_weights is not None:
-        arrays["edge_weights"] = np.asarray(estimate.edge_weights, dtype=np.float64)
-    if estimate.checkpoints:
-        arrays["checkpoints"] = np.stack([c.rotations for c in estimate.checkpoints])
-    with path.open("wb") as file:
-        np.savez(file, **arrays)
-
-
-def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
-    """Read what `save_estimate` wrote, with the scalars that the record holds."""
-    with np.load(path, allow_pickle=False) as data:
-        states = data.get("checkpoints", ())
-        return Estimate(
-            rotations=data["rotations"],
-            edge_weights=data.get("edge_weights", None),
-            iterations=scalars.get("iterations"),
-            stop_reason=scalars.get("stop_reason", ""),
-            cost=scalars.get("cost"),
-            certificate=scalars.get("certificate"),
-            checkpoints=tuple(
-                Checkpoint(rotations=state, **facts)
-                for state, facts in zip(states, scalars.get("checkpoints", ()), strict=True)
-            ),
-            notes=tuple(scalars.get("notes", ())),
-        )
 
 
 def _pin_threads(threads: int) -> int:

@@ -7,8 +7,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from bench.arrays import load_estimate, save_problem
 from bench.execution import outcome
-from bench.execution.child import ESTIMATE_FILE, Request, load_estimate, save_problem
+from bench.execution.child import ESTIMATE_FILE, Request
 from bench.execution.job import execute
 from bench.execution.launch import Launcher
 from bench.execution.outcome import Outcome

@@ -1,5 +1,6 @@
 """Graphs as NumPy archives."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import InputError
-from bench.formats.graph import GraphFile, Ids, build, first
+from bench.formats.graph import GraphFile, Ids, build, check_pairs, first
+from bench.problem import Ints
 
 _MOST_CAMERAS = 10_000_000  # so that a damaged number does not take all memory
 
@@ -23,26 +25,45 @@ def read_npz(path: Path) -> GraphFile:
     InputError
         Naming the file and the array, and the row (from 0) where one is at fault.
     """
-    arrays = _load(path)
-    edges = _checked(path, "edges", arrays["edges"], "iu", (-1, 2)).astype(np.int64)
+    arrays = _load(path, {"edges": "(m, 2)", "rotations": "(m, 3, 3)"}, optional=("weights", "n"))
+    edges = _edges(path, arrays["edges"])
     m = len(edges)
     rotations = _checked(path, "rotations", arrays["rotations"], "iuf", (m, 3, 3)).astype(np.float64)
     weights = _weights(path, arrays["weights"], m) if "weights" in arrays else None
     cameras = _cameras(path, arrays["n"], edges) if "n" in arrays else None
-    if m == 0:
-        raise InputError(f"{path}: 'edges' is empty")
     return build(edges, rotations, lambda row: f"{path}: row {row}", cameras=cameras, weights=weights)
 
 
-def _load(path: Path) -> dict[str, NDArray[Any]]:
+def read_topology(path: Path) -> tuple[int, Ints]:
+    """Read who is connected to whom from a NumPy archive with ``n`` and ``edges`` (m, 2), and nothing else of it.
+
+    Returns
+    -------
+    tuple
+        The number of cameras, and the edges (m, 2), i < j, in the order of the file. Nothing is unpickled.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the array, and the row (from 0) where one is at fault.
+    """
+    arrays = _load(path, {"n": "()", "edges": "(m, 2)"})
+    edges = _edges(path, arrays["edges"])
+    cameras = _cameras(path, arrays["n"], edges)
+    check_pairs(edges, lambda row: f"{path}: row {row}")
+    return len(cameras), np.sort(edges, axis=1).astype(np.int32)
+
+
+def _load(path: Path, required: Mapping[str, str], optional: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
+    """Arrays of an archive; `required` says which shape each that must be there has."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in ("edges", "rotations", "weights", "n") if name in archive}
+            arrays = {name: archive[name] for name in (*required, *optional) if name in archive}
     except Exception as error:  # a damaged zip or header may fail in any of a dozen ways
         raise InputError(
             f"{path}: cannot be read as a NumPy archive of plain arrays; write it with numpy.savez"
         ) from error
-    for name, shape in (("edges", "(m, 2)"), ("rotations", "(m, 3, 3)")):
+    for name, shape in required.items():
         if name not in arrays:
             raise InputError(f"{path}: there is no array '{name}' in it; it must hold one of shape {shape}")
     return arrays
@@ -56,6 +77,13 @@ def _checked(path: Path, name: str, array: NDArray[Any], kinds: str, shape: tupl
     if array.ndim != len(shape) or any(want not in (-1, has) for want, has in zip(shape, array.shape, strict=True)):
         raise InputError(f"{path}: '{name}' must have shape {str(shape).replace('-1', 'm')}, not {array.shape}")
     return array
+
+
+def _edges(path: Path, array: NDArray[Any]) -> Ids:
+    edges = _checked(path, "edges", array, "iu", (-1, 2)).astype(np.int64)
+    if len(edges) == 0:
+        raise InputError(f"{path}: 'edges' is empty")
+    return edges
 
 
 def _weights(path: Path, array: NDArray[Any], m: int) -> NDArray[np.float64]:

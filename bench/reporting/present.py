@@ -28,8 +28,10 @@ def write_tables(results: Results, folder: Path) -> list[Path]:
 
 def write_plots(results: Results, folder: Path) -> list[Path]:
     """Draw every figure that the run has data for, as PNG, PDF and SVG."""
-    from bench.reporting import plots
+    from bench.reporting import iterations, plots
 
     folder.mkdir(parents=True, exist_ok=True)
     figures = plots.figures(results.frame, results.errors)
+    if results.curves:
+        figures["error-over-iterations"] = iterations.error_over_iterations(results.frame, results.curves)
     return [path for name, figure in figures.items() for path in plots.save(figure, folder, name)]
