@@ -58,8 +58,15 @@ class _Collected:
     curves: dict[Place, dict[Configured, list[Curve]]] = field(default_factory=dict)
 
 
-def score(store: Store, rule: str = "l1", protocol: str | None = None, *, oracle: bool = False) -> Results:
-    """Score every job that was ever planned in a store; nothing is run.
+def score(
+    store: Store,
+    rule: str = "l1",
+    protocol: str | None = None,
+    jobs: Sequence[Job] | None = None,
+    *,
+    oracle: bool = False,
+) -> Results:
+    """Score what is stored of a run; nothing is run.
 
     Parameters
     ----------
@@ -69,6 +76,8 @@ def score(store: Store, rule: str = "l1", protocol: str | None = None, *, oracle
         One of `bench.scoring.alignment.RULES`.
     protocol
         Keep the instances of one protocol only, and those of datasets that have none.
+    jobs
+        Only these; by default every job that was ever planned.
     oracle
         Add a row for the best checkpoint of every estimate that has checkpoints. Its parameters end in ``oracle``,
         and it takes no part in ties.
@@ -77,7 +86,7 @@ def score(store: Store, rule: str = "l1", protocol: str | None = None, *, oracle
 
     collected = _Collected()
     instances: dict[str, Instance] = {}
-    for job in store.jobs():
+    for job in store.jobs() if jobs is None else jobs:
         key = job.instance_key
         if key not in instances:
             instances[key] = store.instance(key)

@@ -56,6 +56,14 @@ class Options:
     plugins: tuple[Path, ...] = ()
 
 
+class NothingToRunError(InputError):
+    """No instance is on disk; `missing` holds a sentence for each that was asked for."""
+
+    def __init__(self, missing: Sequence[str]) -> None:
+        super().__init__("there is nothing to run: " + "; ".join(missing))
+        self.missing = tuple(missing)
+
+
 class Run:
     """A run that has been planned: what there is to do, and how to do it.
 
@@ -67,7 +75,7 @@ class Run:
 
     def __init__(
         self,
-        suite: str | None,
+        suite: str | Suite | None,
         methods: Sequence[str] = (),
         datasets: Sequence[str] = (),
         options: Options | None = None,
@@ -75,7 +83,7 @@ class Run:
         self.options = options = options or Options()
         self.experiment = _resolved(suite, methods, datasets, options)
         if not self.experiment.cells:
-            raise InputError("there is nothing to run: " + "; ".join(self.experiment.missing))
+            raise NothingToRunError(self.experiment.missing)
         self.store = Store(options.out or RUNS_FOLDER / self.experiment.suite.name)
         self.limits = Limits(self.experiment.suite.timeout_s, self.experiment.suite.memory_gib)
         self.todo = [cell for cell in self.cells if not self._done(cell)]
@@ -120,10 +128,12 @@ class Run:
             yield from finished
 
 
-def _resolved(suite_name: str | None, methods: Sequence[str], datasets: Sequence[str], options: Options) -> Experiment:
+def _resolved(
+    named: str | Suite | None, methods: Sequence[str], datasets: Sequence[str], options: Options
+) -> Experiment:
     if options.data_dir is not None and not options.data_dir.is_dir():
         raise InputError(f"--data-dir {options.data_dir}: there is no such folder")
-    suite = experiment.load_suite(suite_name or experiment.DEFAULT_SUITE)
+    suite = named if isinstance(named, Suite) else experiment.load_suite(named or experiment.DEFAULT_SUITE)
     known_methods = registry.catalog("method", options.plugins)
     known_datasets = registry.catalog("dataset", options.plugins)
     own = [str(Path(path).resolve()) for path in options.plugins]
@@ -139,7 +149,7 @@ def _resolved(suite_name: str | None, methods: Sequence[str], datasets: Sequence
     }
     if datasets:
         changes["datasets"] = experiment.narrowed(suite.datasets, datasets)
-    if methods and datasets and suite_name is None:
+    if methods and datasets and named is None:
         changes["name"] = "custom"
     suite = replace(suite, **{key: value for key, value in changes.items() if value is not None})
     _check_positive(suite)

@@ -52,6 +52,10 @@ class ErdosRenyi:
     noise
         ``paper``, or one of two models for which a Cramér-Rao bound exists: ``tangent`` (a Gaussian rotation
         vector) and ``langevin``; the formulas are in ``_noise.py``.
+    clairvoyant
+        Leave out the edges that are outliers, which only the truth can tell: the same graph and the same
+        measurements otherwise, so that errors on it say what is lost by having to find the outliers. What is
+        left need not be connected.
     """
 
     n: int = 100
@@ -60,6 +64,7 @@ class ErdosRenyi:
     outliers: float = 0.4
     outlier_model: OutlierModel = "haar"
     noise: Noise = "paper"
+    clairvoyant: bool = False
 
     def __post_init__(self) -> None:
         if self.n < 2:
@@ -78,6 +83,8 @@ class ErdosRenyi:
         truth = so3.from_euler(rng.uniform(-np.pi, np.pi, (self.n, 3)))
         edges = self._connected_graph(rng)
         rotations, outliers = Measurements.of(self).simulate(truth, edges, rng)
+        if self.clairvoyant:
+            edges, rotations, outliers = edges[~outliers], rotations[~outliers], outliers[~outliers]
         problem = Problem(self.n, edges, rotations)
         return Instance(
             problem,
@@ -86,6 +93,7 @@ class ErdosRenyi:
             outliers=outliers,
             source=f"simulated: Tejus et al. 2023, section IV-A; {self.noise} noise",
             revision=identity,
+            notes=("the true outliers are left out, which no method can know",) if self.clairvoyant else (),
             statistics=statistics(problem),
         )
 
@@ -107,7 +115,8 @@ class ErdosRenyi:
 
     def _name(self) -> str:
         """``n100-missing0.5``, then every other parameter that is not at its default."""
-        return "-".join([f"n{self.n}", f"missing{self.missing}", *Measurements.of(self).label()])
+        parts = [f"n{self.n}", f"missing{self.missing}", *Measurements.of(self).label()]
+        return "-".join([*parts, "clairvoyant"] if self.clairvoyant else parts)
 
     def _revision(self, seed: int) -> str:
         """Hash of the code that generates, the parameters and the seed."""

@@ -14,12 +14,15 @@ class What(StrEnum):
     METHODS = "methods"
     DATASETS = "datasets"
     SUITES = "suites"
+    PAPERS = "papers"
 
 
 def list_(what: Annotated[What, typer.Argument()], plugin: PluginOption = None) -> None:
-    """List methods, datasets or suites; broken plug-ins are listed with the reason."""
+    """List methods, datasets, suites or papers; broken plug-ins are listed with the reason."""
     if what is What.SUITES:
         _list_suites()
+    elif what is What.PAPERS:
+        _list_papers()
     else:
         _list_plugins(what.value.removesuffix("s"), plugin or [])
 
@@ -30,6 +33,17 @@ def _list_suites() -> None:
     for name in suite_names():
         suite = load_suite(name)
         typer.echo(f"{name:<10} {suite.title}")
+
+
+def _list_papers() -> None:
+    from bench.papers.layout import load_layout, paper_names
+
+    for name in paper_names():
+        layout = load_layout(name)
+        typer.echo(f"{name:<15} {layout.title}")
+        typer.echo(f"{'':<15}   cite {layout.cite}")
+        for item, content in layout.items.items():
+            typer.echo(f"{'':<15}   {item}: {content.title}")
 
 
 def _list_plugins(kind: str, plugins: list) -> None:  # type: ignore[type-arg]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench.cli.options import Align, AlignOption, DataDirOption, PluginOption, ProtocolOption, Rerun
+from bench.cli.progress import execute
 
 if TYPE_CHECKING:
     from bench.runner import Run
@@ -69,14 +70,7 @@ def run(
         _list_cells(planned)
         return
     planned.prepare(typer.echo)
-    try:
-        _execute(planned)
-    except KeyboardInterrupt:
-        typer.echo(
-            f"\ninterrupted; what is done is kept in {planned.store.folder}, and the same command continues",
-            err=True,
-        )
-        raise typer.Exit(130) from None
+    execute(planned)
     _present(planned, align)
 
 
@@ -100,40 +94,6 @@ def _list_cells(planned: "Run") -> None:
         typer.echo(f"{state:<7} {job.dataset} {job.instance} seed {job.seed} {method}")
     for sentence in planned.experiment.missing:
         typer.echo(f"missing: {sentence}")
-
-
-def _execute(planned: "Run") -> None:
-    """Run what is to do, one line a job, with a progress bar and an ETA where there is a terminal."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    from bench.selection import format_selection
-
-    console = Console(highlight=False, soft_wrap=True)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("ETA"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
-        task = progress.add_task("jobs", total=len(planned.todo))
-        for count, (cell, record) in enumerate(planned.execute(), start=1):
-            progress.advance(task)
-            job = cell.job
-            seconds = f"{record['solve_s']:.2f} s" if "solve_s" in record else ""
-            method = format_selection(job.method, job.parameters)
-            line = f"{count:>4}/{len(planned.todo)}  {job.instance:<24} {method:<32} {seconds:>10}  {record['status']}"
-            console.print(line, markup=False)
 
 
 def _present(planned: "Run", align: Align) -> None:

@@ -1,1 +1,1 @@
-"""Layouts of published tables with their numbers."""
+"""Layouts of published tables and figures, and their comparison with what is measured here."""

@@ -10,6 +10,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from bench.reporting.grid import Grid
 from bench.reporting.rows import TIE_LEGEND, Entry, Scene, Ties, Value, degrees, scenes, seconds, times_note
 
 NO_TRUTH = " · no ground truth: edge residuals, not errors"
@@ -20,9 +21,29 @@ def render_console(
     frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str], *, width: int = 100, terminal: bool = False
 ) -> str:
     """Text of the table, with escape codes for bold where it is for a terminal."""
+    return _printed(console_blocks(frame, ties, footnotes, width=width), width, terminal)
+
+
+def render_grid(grid: Grid, footnotes: Sequence[str] = (), *, width: int = 100, terminal: bool = False) -> str:
+    """Text of a table of another shape; what is bold is marked with an asterisk too."""
+    table = _empty_table()
+    for name in grid.facts:
+        table.add_column(name, justify="left" if name in grid.facts[:1] else "right", overflow="fold")
+    for title, params in grid.methods:
+        table.add_column("\n".join(filter(None, (title, *params.split(",")))), justify="right", overflow="fold")
+    marks = any(cell.bold for _, cells in grid.rows for cell in cells)
+    for k, (facts, cells) in enumerate(grid.rows):
+        shown = (f"{c.text}{('*' if c.bold else ' ') if marks else ''}" for c in cells)
+        ends = k + 1 == len(grid.rows) or bool(grid.rows[k + 1][0][0])
+        table.add_row(*map(Text, facts), *map(Text, shown), end_section=ends and not facts[0])
+    notes = (Text(line, style="dim") for line in grid.notes)
+    return _printed(Group(Text(grid.caption, style="bold"), table, *notes, *_notes(footnotes)), width, terminal)
+
+
+def _printed(drawn: RenderableType, width: int, terminal: bool) -> str:
     console = Console(width=width, force_terminal=terminal, color_system="standard" if terminal else None)
     with console.capture() as capture:
-        console.print(console_blocks(frame, ties, footnotes, width=width))
+        console.print(drawn)
     return "\n".join(line.rstrip() for line in capture.get().splitlines()) + "\n"
 
 
@@ -64,14 +85,7 @@ def _table(scene: Scene, entries: Iterable[Entry], width: int) -> Table:
     if scene.has_truth and width >= WIDE and not several:
         columns += [("p90_deg", "p90 °"), ("within_5_deg", "<5°")]
     columns += [("solve_s", "time s"), ("peak_mib", "MiB")]
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        show_edge=False,
-        pad_edge=False,
-        padding=(0, 1),
-        collapse_padding=True,
-        header_style="dim",
-    )
+    table = _empty_table()
     table.add_column("  method", overflow="fold", min_width=16)
     for _, title in columns:
         table.add_column(title, justify="right", no_wrap=True)
@@ -86,6 +100,17 @@ def _table(scene: Scene, entries: Iterable[Entry], width: int) -> Table:
         marked = Text(f"{'*' if entry.best else ' '} {entry.label}")
         table.add_row(marked, *map(Text, cells), style="bold" if entry.best else "")
     return table
+
+
+def _empty_table() -> Table:
+    return Table(
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        padding=(0, 1),
+        collapse_padding=True,
+        header_style="dim",
+    )
 
 
 def _cell(value: Value, name: str) -> str:

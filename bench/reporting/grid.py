@@ -1,4 +1,7 @@
-"""The table of a paper: a row for each scene, a column for each method, "mean / median" in the cells."""
+"""The table of a paper: a row for each scene, a column for each method, "mean / median" in the cells.
+
+`Grid` and its two renderers are for any table of that shape.
+"""
 
 import math
 import re
@@ -44,6 +47,7 @@ _TEX = {
     "λ": r"$\lambda$",
     "²": r"$^2$",
     "…": r"\dots{}",
+    "−": "$-$",
     "≤": r"$\le$",
     "≥": r"$\ge$",
     "→": r"$\to$",
@@ -53,26 +57,52 @@ _TEX |= {c: f"{{{c}}}" for c in "[]*"}  # after a line break these would be its 
 
 
 @dataclass(frozen=True)
-class _Cell:
+class Cell:
+    """What stands in a place of a table, bold where it stands out."""
+
     text: str
     bold: bool = False
 
 
 @dataclass(frozen=True)
-class _Grid:
-    """One table: scenes that share dataset, protocol and alignment."""
+class Grid:
+    """One table.
+
+    Parameters
+    ----------
+    caption
+        What stands above or below it.
+    facts
+        Heads of the columns at the left, names first and then what is known of them.
+    methods
+        Heads of the other columns: a title, and parameters or "".
+    rows
+        Facts and cells of each row; a row whose first fact is empty belongs to the one above it.
+    notes
+        What stands below.
+    """
 
     caption: str
     facts: tuple[str, ...]
     methods: tuple[tuple[str, str], ...]
-    rows: tuple[tuple[tuple[str, ...], tuple[_Cell, ...]], ...]
+    rows: tuple[tuple[tuple[str, ...], tuple[Cell, ...]], ...]
     notes: tuple[str, ...]
 
 
 def render_markdown(frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str]) -> str:
     """Markdown tables, best and ties bold, what the marks mean and the footnotes below."""
+    return markdown(_grids(frame, ties), footnotes)
+
+
+def render_latex(frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str]) -> str:
+    r"""LaTeX ``table*`` environments; the document needs ``\usepackage{booktabs}`` and nothing else."""
+    return latex(_grids(frame, ties), footnotes)
+
+
+def markdown(grids: Sequence[Grid], footnotes: Sequence[str] = ()) -> str:
+    """Markdown tables, notes below each and the footnotes at the end."""
     parts = []
-    for grid in _grids(frame, ties):
+    for grid in grids:
         header = [*grid.facts, *(f"{title} {params}".strip() for title, params in grid.methods)]
         align = [":--", *("--:" for _ in grid.facts[1:]), *(":-:" for _ in grid.methods)]
         lines = [_pipes(map(markdown_escape, header)), _pipes(align)]
@@ -86,14 +116,14 @@ def render_markdown(frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str]) -
     return "\n\n".join(parts) + "\n"
 
 
-def render_latex(frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str]) -> str:
-    r"""LaTeX ``table*`` environments; the document needs ``\usepackage{booktabs}`` and nothing else."""
-    grids = [part for grid in _grids(frame, ties) for part in _split(grid)]
-    parts = [_latex_table(grid, footnotes if grid is grids[-1] else ()) for grid in grids]
-    return "% needs \\usepackage{booktabs}\n" + "\n".join(parts)
+def latex(grids: Sequence[Grid], footnotes: Sequence[str] = ()) -> str:
+    """LaTeX tables; the footnotes go below the last."""
+    parts = [part for grid in grids for part in _split(grid)]
+    tables = [_latex_table(part, footnotes if part is parts[-1] else ()) for part in parts]
+    return "% needs \\usepackage{booktabs}\n" + "\n".join(tables)
 
 
-def _split(grid: _Grid) -> list[_Grid]:
+def _split(grid: Grid) -> list[Grid]:
     """The same table in parts that fit a page's width; the notes go below the last."""
     count = -(-len(grid.methods) // LATEX_COLUMNS)
     size = -(-len(grid.methods) // count)
@@ -109,7 +139,7 @@ def _split(grid: _Grid) -> list[_Grid]:
     ]
 
 
-def _latex_table(grid: _Grid, footnotes: Sequence[str]) -> str:
+def _latex_table(grid: Grid, footnotes: Sequence[str]) -> str:
     header = [*map(latex_escape, grid.facts), *(_latex_header(*method) for method in grid.methods)]
     lines = [
         r"\begin{table*}[htbp]",
@@ -122,8 +152,12 @@ def _latex_table(grid: _Grid, footnotes: Sequence[str]) -> str:
         rf"{' & '.join(header)} \\",
         r"\midrule",
     ]
+    grouped = False
     for facts, cells in grid.rows:
         shown = (rf"\textbf{{{latex_escape(c.text)}}}" if c.bold else latex_escape(c.text) for c in cells)
+        if grouped and facts[0]:
+            lines.append(r"\addlinespace")
+        grouped = not facts[0]
         lines.append(rf"{' & '.join([*map(latex_escape, facts), *shown])} \\")
     lines += [r"\bottomrule", r"\end{tabular}", ""]
     lines += [rf"\par\smallskip\raggedright {latex_escape(note)}" for note in (*grid.notes, *footnotes)]
@@ -139,14 +173,14 @@ def _latex_header(title: str, params: str) -> str:
     return rf"\begin{{tabular}}[b]{{@{{}}c@{{}}}}{stacked}\end{{tabular}}"
 
 
-def _grids(frame: pd.DataFrame, ties: Ties) -> list[_Grid]:
+def _grids(frame: pd.DataFrame, ties: Ties) -> list[Grid]:
     groups: dict[tuple[str, str, str], list[Scene]] = {}
     for scene in scenes(frame, ties):
         groups.setdefault((scene.dataset, scene.protocol, scene.alignment), []).append(scene)
     return [_grid(group) for group in groups.values()]
 
 
-def _grid(group: Sequence[Scene]) -> _Grid:
+def _grid(group: Sequence[Scene]) -> Grid:
     first = group[0]
     methods = _methods(group)
     columns: list[tuple[str, Callable[[Scene], str]]] = [
@@ -161,7 +195,7 @@ def _grid(group: Sequence[Scene]) -> _Grid:
         by_method = {(e.method, e.params): e for e in scene.entries}
         cells = tuple(_cell(scene, by_method.get(method)) for method in methods)
         rows.append((tuple(fact(scene) for _, fact in shown), cells))
-    return _Grid(
+    return Grid(
         caption=f"{first.dataset}: mean / median error in degrees, {first.alignment} alignment, "
         f"protocol {first.protocol}",
         facts=tuple(name for name, _ in shown),
@@ -181,17 +215,17 @@ def _methods(group: Sequence[Scene]) -> dict[Configured, tuple[str, str]]:
     }
 
 
-def _cell(scene: Scene, entry: Entry | None) -> _Cell:
+def _cell(scene: Scene, entry: Entry | None) -> Cell:
     if entry is None:
-        return _Cell(ABSENT)
+        return Cell(ABSENT)
     if not entry.ok:
-        return _Cell("/".join(dict.fromkeys(_abbreviated(status) for status in entry.failures)))
+        return Cell("/".join(dict.fromkeys(abbreviated(status) for status in entry.failures)))
     if not scene.has_truth:
-        return _Cell(UNKNOWN)
+        return Cell(UNKNOWN)
     mean, median = (_short(entry.values[name].mean) for name in ("mean_deg", "median_deg"))
     most = max(e.scored for e in scene.entries)
     marks = PARTIAL * (entry.scored < most) + f" ({entry.ok}/{entry.seeds})" * (entry.ok < entry.seeds)
-    return _Cell(f"{mean} / {median}{marks}", entry.best)
+    return Cell(f"{mean} / {median}{marks}", entry.best)
 
 
 def _short(value: float) -> str:
@@ -199,7 +233,8 @@ def _short(value: float) -> str:
     return f"{value:.1f}" if value >= 10 else degrees(value)
 
 
-def _abbreviated(status: str) -> str:
+def abbreviated(status: str) -> str:
+    """A status in the width of a cell."""
     return ABBREVIATIONS.get(re.split(r"[(:]", status, maxsplit=1)[0].strip(), status)
 
 
@@ -219,15 +254,24 @@ def _notes(group: Sequence[Scene], cells: Sequence[str]) -> list[str]:
     if any(e.seeds > 1 for scene in group for e in scene.entries):
         marks.append("figures are means over seeds")
     notes += [f"{'; '.join(marks)}."] if marks else []
+    remarks = [
+        (entry.label, remark, scene.instance)
+        for scene in group
+        for entry in scene.entries
+        for remark in filter(None, (entry.failure, *entry.notes))
+    ]
+    return notes + gathered(remarks)
+
+
+def gathered(remarks: Iterable[tuple[str, str, str]]) -> list[str]:
+    """A sentence for each remark on a method, with the instances it was made on, from (method, remark, instance)."""
     said: dict[str, dict[str, list[str]]] = {}
-    for scene in group:
-        for entry in scene.entries:
-            for remark in filter(None, (entry.failure, *entry.notes)):
-                said.setdefault(entry.label, {}).setdefault(remark, []).append(scene.instance)
-    return notes + [
+    for label, remark, instance in remarks:
+        said.setdefault(label, {}).setdefault(remark, []).append(instance)
+    return [
         f"{label}: {remark} [{', '.join(names)}]"
-        for label, remarks in said.items()
-        for remark, names in remarks.items()
+        for label, remarks_on in said.items()
+        for remark, names in remarks_on.items()
     ]
 
 

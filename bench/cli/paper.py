@@ -1,0 +1,118 @@
+"""``bench paper``: a table or figure of a paper, made again and compared."""
+
+import shutil
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bench.cli.options import Align, DataDirOption, Format
+from bench.cli.progress import execute
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from bench.papers.computed import Computed
+    from bench.papers.layout import Item
+    from bench.reporting.grid import Grid
+    from bench.runner import Options
+
+
+def paper(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="See `list papers`; or a TOML file of your own.")],
+    item: Annotated[str, typer.Argument(metavar="ITEM", help="Table or figure, such as table1.")],
+    data_dir: DataDirOption = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of the run.  [default: results/runs/PAPER]")
+    ] = None,
+    align: Annotated[
+        Align | None, typer.Option(help="Rule that removes the gauge; re-scores.  [default: the paper's]")
+    ] = None,
+    seeds: Annotated[int | None, typer.Option(metavar="N", help="Seeds 0 to N-1 of what is computed.")] = None,
+    jobs: Annotated[int | None, typer.Option(metavar="N", help="Jobs at a time.  [default: one a core]")] = None,
+    format: Format = Format.CONSOLE,
+) -> None:
+    """Run what is not done, then print measured | published | difference; a figure is drawn too.
+
+    The table goes to standard output, everything else to standard error.
+    """
+    from bench.papers.layout import load_layout
+    from bench.papers.properties import PropertyTable
+    from bench.papers.published import read_published
+    from bench.papers.scenes import SceneTable
+    from bench.reporting import paper as tables
+    from bench.runner import RUNS_FOLDER, Options
+
+    layout = load_layout(paper)
+    chosen = layout.item(item)
+    if isinstance(chosen, PropertyTable):
+        frame = chosen.compare()
+        _print(tables.property_grid(chosen, frame), frame, format)
+        return
+    folder = out or RUNS_FOLDER / layout.name
+    options = Options(out=folder, data_dir=data_dir, seeds=seeds, jobs=jobs)
+    rule = align.value if align else chosen.alignment
+    published = read_published(layout.folder, chosen.published) if isinstance(chosen, SceneTable) else []
+    computed = _computed(chosen, layout.name, options, rule)
+    if isinstance(chosen, SceneTable):
+        frame = chosen.compare(published, computed)
+        _print(tables.scene_grid(chosen, frame, computed, rule), frame, format)
+    else:
+        from bench.reporting.bands import draw
+
+        points = chosen.points(computed)
+        notes = tables.point_notes(chosen, points, computed)
+        _print(tables.point_grid(chosen, points, rule, notes), points, format)
+        figure = draw(chosen, points, rule, notes)
+        _save(figure, points, folder / "plots", item)
+
+
+def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Computed":
+    """Run what is not done, then score the jobs of the item."""
+    from bench.papers.computed import Computed
+    from bench.results import score
+    from bench.runner import NothingToRunError, Run
+
+    missing: list[str] = []
+    runs = []
+    for suite in item.suites(name):
+        try:
+            planned = Run(suite, options=options)
+        except NothingToRunError as nothing:
+            missing += nothing.missing
+            continue
+        done = len(planned.cells) - len(planned.todo)
+        where = f"{len(planned.cells)} jobs, {done} of them done already -> {planned.store.folder}"
+        typer.echo(f"{name}: {where}", err=True)
+        planned.prepare(lambda text: typer.echo(text, err=True))
+        execute(planned, stderr=True)
+        missing += planned.experiment.missing
+        runs.append(planned)
+    if not runs:
+        return Computed(missing=tuple(missing))
+    store = runs[0].store
+    jobs = [cell.job for planned in runs for cell in planned.cells]
+    notes = {job.instance: store.instance(key).notes for key, job in {job.instance_key: job for job in jobs}.items()}
+    return Computed(jobs, score(store, rule, jobs=jobs), notes, tuple(missing))
+
+
+def _print(grid: "Grid", frame: "pd.DataFrame", format: Format) -> None:
+    from bench.reporting.paper import render
+
+    width = shutil.get_terminal_size((120, 24)).columns
+    text, notes = render(grid, frame, format.value, width=width, terminal=sys.stdout.isatty())
+    typer.echo(text, nl=not text.endswith("\n"))
+    for note in notes:
+        typer.echo(note, err=True)
+
+
+def _save(figure: "Figure", points: "pd.DataFrame", folder: Path, name: str) -> None:
+    from bench.reporting.style import save
+
+    paths = save(figure, folder, name)
+    paths.append(folder / f"{name}.csv")
+    points.to_csv(paths[-1], index=False)
+    for path in paths:
+        typer.echo(path, err=True)

@@ -1,0 +1,140 @@
+"""Read the layout of a paper: a TOML file that says what its tables and figures hold."""
+
+import dataclasses
+import tomllib
+import types
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+from bench.errors import InputError
+from bench.papers.curves import CurvePlot
+from bench.papers.properties import PropertyTable
+from bench.papers.scenes import SceneTable
+from bench.registry import suggestion
+from bench.scoring.alignment import RULES
+
+Item = SceneTable | PropertyTable | CurvePlot
+KINDS: dict[str, type[Item]] = {"scenes": SceneTable, "properties": PropertyTable, "curves": CurvePlot}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A paper and the items of it that can be made again.
+
+    Parameters
+    ----------
+    name, title, cite
+        Its id, its title with authors and year, and its key in ``methods/references.bib``.
+    items
+        Tables and figures, by the names that the command line takes.
+    folder
+        Where its published numbers are.
+    """
+
+    name: str
+    title: str
+    cite: str
+    items: Mapping[str, Item]
+    folder: Traversable
+
+    def item(self, name: str) -> Item:
+        """One table or figure.
+
+        Raises
+        ------
+        InputError
+            Where the paper has no such item here.
+        """
+        if name not in self.items:
+            raise InputError(f"paper {self.name} has no '{name}' here{suggestion(name, self.items)}")
+        return self.items[name]
+
+
+def paper_names() -> list[str]:
+    """Names of the papers whose layouts come with the project."""
+    return sorted(Path(f.name).stem for f in resources.files("bench.papers").iterdir() if f.name.endswith(".toml"))
+
+
+def load_layout(name: str) -> Layout:
+    """Read a layout by its name, or by the path of a TOML file with its published numbers beside it.
+
+    Raises
+    ------
+    InputError
+        Where there is no such layout, or the file is not one.
+    """
+    if name.endswith(".toml"):
+        path = Path(name)
+        if not path.is_file():
+            raise InputError(f"there is no layout {name}")
+        return _parsed(path.stem, name, path.read_text(encoding="utf-8"), path.parent)
+    if name not in (names := paper_names()):
+        raise InputError(f"there is no paper '{name}'{suggestion(name, names)}")
+    text = (resources.files("bench.papers") / f"{name}.toml").read_text(encoding="utf-8")
+    return _parsed(name, f"layout {name}", text, resources.files("bench.published"))
+
+
+def _parsed(name: str, where: str, text: str, folder: Traversable) -> Layout:
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{where} is not valid TOML: {error}") from error
+    head = {key: content.pop(key, "") for key in ("title", "cite")}
+    for key, value in head.items():
+        if not isinstance(value, str):
+            raise InputError(f"{where}: '{key}' must be a str, not {value!r}")
+    items = {key: _item(f"{where}: {key}", value) for key, value in content.items()}
+    return Layout(name, head["title"] or name, head["cite"], items, folder)
+
+
+def _item(where: str, content: Any) -> Item:
+    if not isinstance(content, dict):
+        raise InputError(f"{where} must be a table such as [table1], not {content!r}")
+    kind = content.pop("kind", None)
+    if kind not in KINDS:
+        raise InputError(f"{where}.kind must be one of {', '.join(KINDS)}, not {kind!r}")
+    item = _made(KINDS[kind], content, where)
+    if not isinstance(item, PropertyTable) and item.alignment not in RULES:
+        raise InputError(f"{where}.alignment is '{item.alignment}'{suggestion(item.alignment, RULES)}")
+    return item
+
+
+def _made(cls: Any, content: Any, where: str) -> Any:
+    """An instance of a dataclass, from the keys and values of a TOML table."""
+    if not isinstance(content, dict):
+        raise InputError(f"{where} must be a table, not {content!r}")
+    fields = {f.name: f for f in dataclasses.fields(cls)}
+    hints = typing.get_type_hints(cls)
+    for key in content:
+        if key not in fields:
+            raise InputError(f"{where}: unknown key '{key}'{suggestion(key, fields)}")
+    for key, f in fields.items():
+        if key not in content and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING:
+            raise InputError(f"{where}: key '{key}' is missing")
+    return cls(**{key: _value(hints[key], value, f"{where}.{key}") for key, value in content.items()})
+
+
+def _value(hint: Any, value: Any, where: str) -> Any:
+    """A TOML value as the type of a field."""
+    if dataclasses.is_dataclass(hint):
+        return _made(hint, value, where)
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is tuple and isinstance(value, list):
+        return tuple(_value(arguments[0], entry, where) for entry in value)
+    if origin is Mapping and isinstance(value, dict):
+        return {key: _value(arguments[1], entry, f"{where}.{key}") for key, entry in value.items()}
+    if origin is typing.Literal:
+        fits, wanted = value in arguments, " or ".join(map(repr, arguments))
+    else:
+        accepted = {float: int | float, Mapping: dict, tuple: list}.get(origin or hint, origin or hint)
+        union = hint if isinstance(hint, types.UnionType) else accepted
+        fits = hint is Any or (isinstance(value, union) and (hint is bool or not isinstance(value, bool)))
+        wanted = f"a {getattr(union, '__name__', union)}"
+    if not fits:
+        raise InputError(f"{where} must be {wanted}, not {value!r}")
+    return value

@@ -1,0 +1,314 @@
+"""Published tables and figures beside what is measured here."""
+
+import csv
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scenes import write_scene
+
+from bench.errors import InputError
+from bench.papers.computed import Computed
+from bench.papers.curves import CurvePlot
+from bench.papers.layout import load_layout, paper_names
+from bench.papers.properties import PropertyTable
+from bench.papers.published import methods_of, read_published
+from bench.papers.scenes import SceneTable
+from bench.registry import catalog
+from bench.reporting.paper import property_grid, render, scene_grid
+from bench.results import Results
+
+LAYOUT = """
+title = "A paper"
+
+[t]
+kind = "scenes"
+title = "Errors"
+published = "t.csv"
+dataset = "1dsfm[protocol=truth-subgraph]"
+scene_parameter = "scene"
+statistic = "median_deg"
+alignment = "l1"
+highlight_reference = "Ours"
+highlight_deg = 0.5
+
+[t.measured]
+Ours = ["spectral", "spanning-tree"]
+Theirs = []
+
+[t.scenes]
+"Ellis Island" = "Ellis_Island"
+"Madrid" = "Madrid_Metropolis"
+"Alamo" = "Alamo"
+
+[f]
+kind = "curves"
+title = "Curves"
+dataset = "erdos-renyi[noise_deg=1,outliers=0.4]"
+statistic = "mean_deg"
+alignment = "l1"
+seeds = 10
+panel = { parameter = "n", label = "{} nodes", values = [12, 16] }
+axis = { parameter = "missing", label = "missing", values = [0.2, 0.5] }
+
+[[f.curves]]
+label = "tree"
+method = "spanning-tree"
+
+[[f.curves]]
+label = "clairvoyant"
+method = "spectral"
+dataset = { clairvoyant = true }
+reference = true
+"""
+PUBLISHED = """scene,n_cameras,edges_percent,hardness,Ours,Theirs,source
+Ellis Island,9,50,0.1000,0.8,1.3,here
+Madrid,341,31,0.0029,2.3,1.7,here
+Alamo,577,50,0.0017,1.2,,here
+"""
+
+
+@pytest.fixture
+def layout_file(tmp_path: Path) -> Path:
+    (tmp_path / "t.csv").write_text(PUBLISHED)
+    path = tmp_path / "a-paper.toml"
+    path.write_text(LAYOUT)
+    return path
+
+
+def bench(*arguments: object, code: int = 0, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "bench", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=300)
+    assert done.returncode == code, f"{done.stdout}\n{done.stderr}"
+    assert "Traceback" not in done.stderr
+    return done
+
+
+@pytest.mark.parametrize("name", paper_names())
+def test_every_layout_that_ships_can_be_read_and_names_what_there_is(name: str) -> None:
+    layout = load_layout(name)
+    bibliography = (Path(__file__).parent.parent / "methods" / "references.bib").read_text()
+    assert f"{{{layout.cite}," in bibliography
+    methods, datasets = catalog("method"), catalog("dataset")
+    for item in layout.items.values():
+        for suite in item.suites(name):
+            assert methods.select(suite.methods)
+            assert datasets.select(suite.datasets)
+        if isinstance(item, SceneTable):
+            rows = read_published(layout.folder, item.published)
+            frame = item.compare(rows, Computed())
+            assert list(item.scenes) == [row["scene"] for row in rows]
+            assert list(item.measured) == methods_of(rows)
+            assert frame["measured"].isna().all()
+        if isinstance(item, PropertyTable):
+            assert item.compare()["agree"].dropna().all()
+
+
+def test_the_papers_highlights_follow_from_its_rule() -> None:
+    layout = load_layout("dmf-synch-2023")
+    table = layout.item("table1")
+    assert isinstance(table, SceneTable)
+    frame = table.compare(read_published(layout.folder, table.published), Computed())
+    near = frame[frame["near_published"]].groupby("quantity")["scene"].agg(set)
+    assert near["PoGO-Net"] == {
+        "Alamo", "Ellis Island", "Montreal Notre Dame", "Piazza del Popolo", "Vienna Cathedral",
+    }  # fmt: skip
+    assert near["NeuRoRA"] == near["PoGO-Net"] | {"Roman Forum"}
+    assert set(table.scenes) - near["L1-IRLS"] == {"Gendarmenmarkt", "Madrid Metropolis"}
+    assert "DMF-Synch" not in near
+
+
+def results(**medians: dict[str, float]) -> Results:
+    rows = [
+        {
+            "instance": instance,
+            "method": method,
+            "params": "",
+            "status": "ok" if np.isfinite(median) else "timeout",
+            "median_deg": median,
+            "n_cameras": 9,
+            "edges_percent": 60.5,
+            "hardness": 0.25,
+            "notes": "",
+        }
+        for instance, by_method in medians.items()
+        for method, median in by_method.items()
+    ]
+    return Results(pd.DataFrame(rows), {}, {}, (), "l1", {})
+
+
+def test_differences_and_marks_are_those_worked_out_by_hand(layout_file: Path) -> None:
+    layout = load_layout(str(layout_file))
+    table = layout.item("t")
+    assert isinstance(table, SceneTable)
+    measured = results(Ellis_Island={"spectral": 0.75, "spanning-tree": np.nan}, Madrid_Metropolis={"spectral": np.nan})
+    computed = Computed((), measured, {"Ellis_Island": ("not the paper's cameras",)}, ("get it with: fetch",))
+    frame = table.compare(read_published(layout.folder, table.published), computed)
+    cells = frame.set_index(["instance", "quantity", "method"])
+    assert cells.loc[("Ellis_Island", "Ours", "spectral"), "difference"] == pytest.approx(-0.05)
+    assert cells.loc[("Ellis_Island", "edges_percent", ""), "difference"] == pytest.approx(10.5)
+    assert cells.loc[("Ellis_Island", "Ours", "spanning-tree"), "status"] == "timeout"
+    assert cells.loc[("Madrid_Metropolis", "Ours", "spanning-tree"), "status"] == "not-run"
+    assert cells.loc[("Alamo", "Ours", "spectral"), "status"] == "not on disk"
+    near = cells["near_published"].xs("Theirs", level="quantity").droplevel("method")
+    assert near.to_dict() == {"Ellis_Island": True, "Madrid_Metropolis": False, "Alamo": False}
+
+    text, _ = render(scene_grid(table, frame, computed, "l1"), frame, "markdown")
+    assert "| Ellis Island (a) | measured | 9 | 60.5 | 0.2500 | 0.75 | TO | – |" in text
+    assert "|  | published | 9 | 50 | 0.1000 | 0.8 | 0.8 | **1.3** |" in text
+    assert "|  | difference | 0 | +10.5 | +0.1500 | −0.05 |  |  |" in text
+    assert "| Alamo | published | 577 | 50 | 0.0017 | 1.2 | 1.2 | – |" in text
+    assert "(a) not the paper's cameras." in text
+    assert "Theirs: published only" in text
+    assert "Get it with: fetch." in text
+
+
+def test_a_table_of_two_scenes_on_disk(layout_file: Path, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    write_scene(data / "Ellis_Island", images=12)
+    write_scene(data / "Madrid_Metropolis", images=14, unregistered=(2, 5))
+    command = ("paper", layout_file, "t", "--data-dir", data, "--out", tmp_path / "run")
+    done = bench(*command, "--format", "csv")
+    cells = {(r["scene"], r["quantity"], r["method"]): r for r in csv.DictReader(io.StringIO(done.stdout))}
+    for method in ("spectral", "spanning-tree"):
+        assert float(cells["Ellis Island", "Ours", method]["difference"]) == pytest.approx(-0.8, abs=0.01)
+        assert float(cells["Madrid", "Ours", method]["difference"]) == pytest.approx(-2.3, abs=0.01)
+    assert float(cells["Ellis Island", "n_cameras", ""]["measured"]) == 10
+    assert float(cells["Madrid", "edges_percent", ""]["difference"]) == pytest.approx(69)
+    assert cells["Ellis Island", "Theirs", ""]["status"] == "published only"
+    assert "4 jobs, 0 of them done already" in done.stderr
+    assert "alamo is not on disk; get it with: python -m bench data fetch" in done.stderr.lower().replace("1dsfm/", "")
+
+    again = bench(*command, "--align", "chordal")
+    assert "4 jobs, 4 of them done already" in again.stderr
+    assert "chordal alignment" in again.stdout
+    assert "(b) ground truth covers 11 of the 341 cameras" in " ".join(again.stdout.split())
+    assert r"\begin{tabular}" in bench(*command, "--format", "latex").stdout
+
+
+def test_a_table_without_any_scene_is_published_only(layout_file: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    done = bench("paper", layout_file, "t", "--data-dir", tmp_path / "empty", "--out", tmp_path / "run")
+    assert done.stdout.count("published") >= 3
+    assert "measured  " not in done.stdout
+    assert "python -m bench data fetch 1dsfm" in done.stdout
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_figure_with_bands_over_two_seeds(layout_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    done = bench("paper", layout_file, "f", "--seeds", 2, "--out", out, "--format", "csv")
+    points = pd.read_csv(io.StringIO(done.stdout))
+    assert list(zip(points["n"], points["missing"], strict=True))[:4] == [(12, 0.2), (12, 0.5), (16, 0.2), (16, 0.5)]
+    assert (points["seeds"] == 2).all()
+    assert (points["half_width_deg"] > 0).all()
+    means = points.groupby("curve")["mean_deg"].mean()
+    assert means["clairvoyant"] < 2 < means["tree"]
+    assert {p.name for p in (out / "plots").iterdir()} == {"f.png", "f.pdf", "f.svg", "f.csv"}
+    pd.testing.assert_frame_equal(pd.read_csv(out / "plots" / "f.csv"), points)
+
+    records = pd.read_csv(io.StringIO(bench("table", out, "--format", "csv").stdout))
+    one = records[(records["instance"] == "n12-missing0.2-noise1.0") & (records["method"] == "spanning-tree")]
+    assert points["mean_deg"].iloc[0] == pytest.approx(one["mean_deg"].mean())
+    assert set(records.loc[records["method"] == "spectral", "instance"].str.endswith("-clairvoyant")) == {True}
+
+
+def test_the_clairvoyant_graph_is_the_same_without_its_outliers() -> None:
+    info = catalog("dataset")["erdos-renyi"]
+    (plain,), (without,) = (
+        list(info.configure({"n": 20, "clairvoyant": c}).sources(None, seed=3)) for c in (False, True)
+    )
+    assert plain.revision != without.revision
+    whole, inliers = plain.load(), without.load()
+    assert whole.outliers is not None
+    assert inliers.outliers is not None
+    kept = ~whole.outliers
+    assert (inliers.problem.edges == whole.problem.edges[kept]).all()
+    assert (inliers.problem.rotations == whole.problem.rotations[kept]).all()
+    assert (inliers.truth == whole.truth).all()  # type: ignore[union-attr]
+    assert not inliers.outliers.any()
+    assert (inliers.name, len(inliers.notes)) == ("n20-missing0.5-clairvoyant", 1)
+
+
+def test_what_differs_from_the_published_properties_is_bold() -> None:
+    table = PropertyTable(
+        title="Needs",
+        columns={"supervised": "supervised"},
+        published={"Tree": {"supervised": True}, "Elsewhere": {"supervised": True}},
+        declared={"Tree": "spanning-tree", "Spectral": "spectral"},
+    )
+    text, _ = render(property_grid(table, table.compare()), table.compare(), "markdown")
+    assert "| Tree | spanning-tree | **no** | **yes** |" in text
+    assert "| Elsewhere | – | – | yes |" in text
+    assert "| Spectral | spectral | no | – |" in text
+
+
+def test_papers_are_listed_with_their_items() -> None:
+    listed = bench("list", "papers").stdout
+    assert "dmf-synch-2023" in listed
+    assert all(f"{item}: " in listed for item in ("table1", "table2", "fig3"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("dmf-synch-2032", "table1"), "did you mean 'dmf-synch-2023'?"),
+        (("dmf-synch-2023", "tabel1"), "did you mean 'table1'?"),
+        (("absent.toml", "table1"), "there is no layout absent.toml"),
+    ],
+)
+def test_unknown_names_are_one_sentence(arguments: tuple[str, str], says: str) -> None:
+    done = bench("paper", *arguments, code=2)
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("highlight_deg = 0.5", 'highlight_deg = "much"', "highlight_deg must be"),
+        ("highlight_deg = 0.5", "", "key 'highlight_deg' is missing"),
+        ('kind = "scenes"', 'kind = "scene"', "kind must be one of"),
+        ('statistic = "median_deg"\n', 'statistic = "median"\n', "statistic must be 'mean_deg' or 'median_deg'"),
+        ('alignment = "l1"\nhigh', 'alignment = "l2"\nhigh', "did you mean 'l1'?"),
+        ("values = [12, 16]", "value = [12, 16]", "unknown key 'value'; did you mean 'values'?"),
+        ('title = "A paper"', "title = A paper", "is not valid TOML"),
+    ],
+)
+def test_a_layout_that_is_not_one_says_where(layout_file: Path, old: str, new: str, says: str) -> None:
+    layout_file.write_text(LAYOUT.replace(old, new))
+    with pytest.raises(InputError, match=r"a-paper\.toml") as caught:
+        load_layout(str(layout_file))
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("2.3", "2,3x", "t.csv:3: '3x' in column 'Theirs' is not a number"),
+        (",source", ",sauce", "has no column 'source'"),
+        ("Theirs", "Others", "no entry for column 'Others'"),
+        ("Alamo", "Alamos", "no entry for 'Alamos'"),
+    ],
+)
+def test_published_numbers_that_do_not_fit_say_where(layout_file: Path, old: str, new: str, says: str) -> None:
+    layout = load_layout(str(layout_file))
+    table = layout.item("t")
+    assert isinstance(table, SceneTable)
+    (layout_file.parent / "t.csv").write_text(PUBLISHED.replace(old, new))
+    with pytest.raises(InputError) as caught:
+        table.compare(read_published(layout.folder, table.published), Computed())
+    assert says in str(caught.value)
+
+
+def test_curves_group_what_has_to_run_by_dataset(layout_file: Path) -> None:
+    plot = load_layout(str(layout_file)).item("f")
+    assert isinstance(plot, CurvePlot)
+    plain, clairvoyant = plot.suites("p")
+    assert plain.methods == ("spanning-tree",)
+    assert clairvoyant.methods == ("spectral",)
+    assert clairvoyant.datasets[0] == "erdos-renyi[noise_deg=1,outliers=0.4,n=12,missing=0.2,clairvoyant=true]"
