@@ -1,18 +1,17 @@
 """From a suite to jobs: the cross product of instances, methods and seeds, each with its identity."""
 
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from bench import registry, selection
+from bench import named, registry, selection
 from bench.errors import InputError
 from bench.registry import Catalog, Info, Missing, Source, parameters_of
 from bench.store import SCHEMA, Job, digest
 
 DEFAULT_SUITE = "quick"
+SUITES = "bench.suites"
 
 
 @dataclass(frozen=True)
@@ -60,8 +59,7 @@ class Experiment:
 
 def suite_names() -> list[str]:
     """Names of the suites that come with the project."""
-    folder = resources.files("bench.suites")
-    return sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith(".toml"))
+    return named.names(SUITES)
 
 
 def load_suite(name: str) -> Suite:
@@ -72,25 +70,8 @@ def load_suite(name: str) -> Suite:
     InputError
         Where there is no such suite, or the file is not one.
     """
-    if name.endswith(".toml"):
-        path = Path(name)
-        if not path.is_file():
-            raise InputError(f"there is no suite file {name}")
-        text, where, stem = path.read_text(encoding="utf-8"), name, path.stem
-    else:
-        names = suite_names()
-        if name not in names:
-            raise InputError(f"there is no suite '{name}'{registry.suggestion(name, names)}")
-        text, where, stem = (
-            (resources.files("bench.suites") / f"{name}.toml").read_text(),
-            f"suite {name}",
-            name,
-        )
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{where} is not valid TOML: {error}") from error
-    return _checked_suite(stem, where, content)
+    stem, content = named.read("suite", SUITES, name)
+    return _checked_suite(stem, f"suite {name}", content)
 
 
 _FIELDS: dict[str, tuple[type, ...]] = {

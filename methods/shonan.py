@@ -10,7 +10,7 @@ from bench.registry import method
 
 from ._certificate import chordal_cost, smallest_eigenvalue
 from ._stopwatch import Stopwatch
-from .spectral import spectral_rotations
+from .spectral import compile_and_load, spectral_rotations
 
 HUBER = 1.345  # GTSAM's threshold, in units of sigma
 
@@ -65,6 +65,10 @@ class Shonan:
     def __post_init__(self) -> None:
         if self.sigma_deg <= 0:
             raise ValueError(f"sigma_deg must be positive, not {self.sigma_deg:g}")
+
+    def warm_up(self) -> None:
+        """Compile what the spectral start uses."""
+        compile_and_load()
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         return self._huber(problem) if self.loss == "huber" else self._l2(problem)

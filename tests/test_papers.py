@@ -258,7 +258,7 @@ def test_papers_are_listed_with_their_items() -> None:
     [
         (("dmf-synch-2032", "table1"), "did you mean 'dmf-synch-2023'?"),
         (("dmf-synch-2023", "tabel1"), "did you mean 'table1'?"),
-        (("absent.toml", "table1"), "there is no layout absent.toml"),
+        (("absent.toml", "table1"), "there is no paper 'absent.toml'"),
     ],
 )
 def test_unknown_names_are_one_sentence(arguments: tuple[str, str], says: str) -> None:

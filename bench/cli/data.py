@@ -1,11 +1,14 @@
 """``bench data``: what is on disk, and how to get the rest."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bench.cli.options import DataDirOption, Protocol, ProtocolOption
+
+if TYPE_CHECKING:
+    from bench.registry import Missing, Source
 
 app = typer.Typer(help="List, fetch, verify and inspect data.", no_args_is_help=True)
 
@@ -77,7 +80,7 @@ def verify(name: Annotated[str, typer.Argument(metavar="DATASET")], data_dir: Da
     raise typer.Exit(1 if wrong else 0)
 
 
-def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> list:  # type: ignore[type-arg]
+def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> "list[Source | Missing]":
     from bench import registry
 
     found = []
@@ -88,7 +91,7 @@ def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> lis
     return found
 
 
-def _fetchable(name: str):  # type: ignore[no-untyped-def]
+def _fetchable(name: str) -> Any:
     from bench import registry
     from bench.errors import InputError
 

@@ -1,6 +1,7 @@
 """``bench list``: what there is."""
 
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -46,7 +47,7 @@ def _list_papers() -> None:
             typer.echo(f"{'':<15}   {item}: {content.title}")
 
 
-def _list_plugins(kind: str, plugins: list) -> None:  # type: ignore[type-arg]
+def _list_plugins(kind: str, plugins: list[Path]) -> None:
     from bench import registry, selection
 
     found = registry.catalog(kind, plugins)

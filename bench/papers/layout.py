@@ -1,7 +1,6 @@
 """Read the layout of a paper: a TOML file that says what its tables and figures hold."""
 
 import dataclasses
-import tomllib
 import types
 import typing
 from collections.abc import Mapping
@@ -11,6 +10,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+from bench import named
 from bench.errors import InputError
 from bench.papers.curves import CurvePlot
 from bench.papers.properties import PropertyTable
@@ -19,6 +19,7 @@ from bench.registry import suggestion
 from bench.scoring.alignment import RULES
 
 Item = SceneTable | PropertyTable | CurvePlot
+PAPERS = "bench.papers"
 KINDS: dict[str, type[Item]] = {"scenes": SceneTable, "properties": PropertyTable, "curves": CurvePlot}
 
 
@@ -57,7 +58,7 @@ class Layout:
 
 def paper_names() -> list[str]:
     """Names of the papers whose layouts come with the project."""
-    return sorted(Path(f.name).stem for f in resources.files("bench.papers").iterdir() if f.name.endswith(".toml"))
+    return named.names(PAPERS)
 
 
 def load_layout(name: str) -> Layout:
@@ -68,22 +69,12 @@ def load_layout(name: str) -> Layout:
     InputError
         Where there is no such layout, or the file is not one.
     """
-    if name.endswith(".toml"):
-        path = Path(name)
-        if not path.is_file():
-            raise InputError(f"there is no layout {name}")
-        return _parsed(path.stem, name, path.read_text(encoding="utf-8"), path.parent)
-    if name not in (names := paper_names()):
-        raise InputError(f"there is no paper '{name}'{suggestion(name, names)}")
-    text = (resources.files("bench.papers") / f"{name}.toml").read_text(encoding="utf-8")
-    return _parsed(name, f"layout {name}", text, resources.files("bench.published"))
+    stem, content = named.read("paper", PAPERS, name)
+    folder = Path(name).parent if name.endswith(".toml") else resources.files("bench.published")
+    return _parsed(stem, f"layout {name}", content, folder)
 
 
-def _parsed(name: str, where: str, text: str, folder: Traversable) -> Layout:
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{where} is not valid TOML: {error}") from error
+def _parsed(name: str, where: str, content: dict[str, Any], folder: Traversable) -> Layout:
     head = {key: content.pop(key, "") for key in ("title", "cite")}
     for key, value in head.items():
         if not isinstance(value, str):
