@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from bench.reporting.grid import Grid
-from bench.reporting.rows import TIE_LEGEND, TIMES_NOTE, Entry, Scene, Ties, Value, degrees, scenes, seconds
+from bench.reporting.rows import TIE_LEGEND, Entry, Scene, Ties, Value, degrees, scenes, seconds, times_note
 
 NO_TRUTH = " · no ground truth: edge residuals, not errors"
 WIDE = 96  # columns from which the 90th percentile and the share under 5 degrees fit
@@ -137,7 +137,7 @@ def _legend(frame: pd.DataFrame) -> list[str]:
     rules = " and ".join(dict.fromkeys(map(str, frame["alignment"])))
     lines = [
         f"* {TIE_LEGEND}",
-        f"errors in degrees over the scored cameras after {rules} alignment; {TIMES_NOTE}; "
+        f"errors in degrees over the scored cameras after {rules} alignment; {times_note(frame)}; "
         "cameras: solved / scored / all",
     ]
     if frame["seed"].nunique() > 1:

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from bench.problem import Floats
-from bench.reporting.rows import OK, TIMES_NOTE, Configured, Place
+from bench.reporting.rows import OK, Configured, Place, times_note
 from bench.reporting.style import GREY, Look, describe, log_axis, looks, panels, save, styled
 
 __all__ = ["cumulative_errors", "error_against_time", "error_per_scene", "figures", "save"]
@@ -148,7 +148,7 @@ def error_against_time(frame: pd.DataFrame, *, aggregated: bool = False) -> Figu
         _label_left(axes, "median error (°)")
         floor = f" Errors below {FLOOR_DEG:g}° count as {FLOOR_DEG:g}°."
         floored = floor if (everything["median_deg"] <= FLOOR_DEG).any() else ""
-        what = f"Lower left is better; {TIMES_NOTE}. {_rules(frame)}{remarks}{floored}"
+        what = f"Lower left is better; {times_note(frame)}. {_rules(frame)}{remarks}{floored}"
         describe(figure, "Error against time", what)
     return figure
 

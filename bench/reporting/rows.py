@@ -14,7 +14,6 @@ Configured = tuple[str, str]  # method, params
 Ties = Mapping[Place, Set[Configured]]
 
 OK = "ok"
-TIMES_NOTE = "times from a packed accuracy run"
 TIE_LEGEND = (
     "not told apart from the best median, nor by the mean (paired bootstrap over cameras and seeds, level 5 %, "
     "all pairs corrected; cameras of a scene are correlated)"
@@ -183,6 +182,12 @@ def _numbers(column: pd.Series) -> list[float]:
 
 def _mean(numbers: list[float]) -> float:
     return math.fsum(numbers) / len(numbers) if numbers else math.nan
+
+
+def times_note(frame: pd.DataFrame) -> str:
+    """How the times were taken: the optional column ``timing`` is True on rows of a timing run."""
+    timed = "timing" in frame and bool(frame["timing"].all())
+    return "times from a timing run, one job at a time" if timed else "times from a packed accuracy run"
 
 
 def degrees(value: float) -> str:
