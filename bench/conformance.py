@@ -61,9 +61,9 @@ class _Kit:
     info: Info
     solver: SingleSolver
 
-    def promised(self, fact: str) -> float | None:
+    def promised(self, fact: str) -> Any:
         """Promise of the method as configured: its attribute of that name, or what its declaration says."""
-        return getattr(self.info.configure(self.solver.parameters), fact, self.info.facts[fact])
+        return self.info.fact(fact, self.info.configure(self.solver.parameters))
 
     @property
     def exact_deg(self) -> float:
@@ -161,7 +161,7 @@ def _same_seed_same_answer(kit: _Kit) -> None:
 
 
 def _deterministic_as_declared(kit: _Kit) -> None:
-    if not kit.info.facts["deterministic"]:
+    if not kit.promised("deterministic"):
         raise NotApplicable("declared as not deterministic")
     problem, _ = _noisy()
     if not np.array_equal(kit.solve(problem, seed=3), kit.solve(problem, seed=4)):

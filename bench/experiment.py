@@ -160,9 +160,10 @@ def _cells_of(
     key = digest([dataset.name, parameters_of(configured), source.name, source.revision])
     cells = []
     for info, parameters in methods:
-        repeated = not source.seeded and not info.facts["deterministic"]
+        configured_method = info.configure(parameters)
+        repeated = not source.seeded and not info.fact("deterministic", configured_method)
+        complete = parameters_of(configured_method)
         for method_seed in range(seeds) if repeated else (seed,):
-            complete = parameters_of(info.configure(parameters))
             identity = digest([SCHEMA, key, info.name, complete, info.source_hash, method_seed])
             job = Job(identity, label, source.name, key, info.name, info.title, info.origin, parameters, method_seed)
             cells.append(Cell(job, source, info))

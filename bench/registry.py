@@ -111,6 +111,10 @@ class Info:
         module = sys.modules[self.cls.__module__]
         return _hash_of_modules(module)
 
+    def fact(self, name: str, configured: Any) -> Any:
+        """A fact of a configured object: its attribute of that name, or what the plug-in declares."""
+        return getattr(configured, name, self.facts[name])
+
     def defaults(self) -> dict[str, Any]:
         """Parameters with their default values."""
         return {f.name: _default(f) for f in dataclasses.fields(self.cls)}
@@ -168,12 +172,14 @@ def method(
     deterministic
         Whether the same problem always gives the same estimate, whatever the seed.
     max_cameras
-        The largest problem it is meant for; larger ones become ``skipped`` rows. A field of that name overrides it.
+        The largest problem it is meant for; larger ones become ``skipped`` rows.
     exact_to_deg
         How closely it promises to recover small noise-free problems.
     invariant_to_deg
         How far relabelling cameras, permuting or reversing edges and turning frames may move its answer to a small
-        noisy problem; None promises nothing. Attributes of these names override both.
+        noisy problem; None promises nothing.
+
+    Where a fact depends on the parameters, an attribute of its name overrides what is declared (see `Info.fact`).
     """
     facts = {
         "install": install,

@@ -29,7 +29,6 @@ GROWTH = 10.0  # of sigma_4 / sigma_3
     cite="tejus2023",
     requires=("torch", "numba", "scipy"),
     robust=True,
-    deterministic=False,
 )
 @dataclass(frozen=True)
 class DMFSynch:
@@ -147,6 +146,11 @@ class DMFSynch:
     def layers(self) -> int:
         """Number of factors."""
         return self.depth or (5 if self.preset == "paper" else 3)
+
+    @property
+    def deterministic(self) -> bool:
+        """The thin form draws nothing unless it starts at random or is wider than three."""
+        return self.preset == "thin" and self.start != "random" and (self.width or 3) == 3
 
     @property
     def exact_to_deg(self) -> float:

@@ -12,9 +12,8 @@ from bench.registry import method
 from . import _edge_kernels, spectral
 from ._laplacian import LaplacianSolver
 from ._losses import LOSSES, Loss
-from .spanning_tree import tree_rotations
+from ._starts import Start, start_rotations
 
-START_TOLERANCE = 1e-2  # radians; the start need not be better
 SMALLEST_WEIGHT = 1e-10  # relative to the largest
 
 LossName = Literal[
@@ -65,7 +64,7 @@ class L1IRLS:
     loss
         Loss of the second stage.
     init
-        Where to start.
+        Where to start, see `start_rotations`.
     l1_iterations, irls_iterations
         Limits of the two stages.
     tolerance_deg
@@ -74,7 +73,7 @@ class L1IRLS:
 
     sigma_deg: float = 5.0
     loss: LossName = "geman-mcclure"
-    init: Literal["spectral", "spanning-tree"] = "spectral"
+    init: Start = "spectral"
     l1_iterations: int = 10
     irls_iterations: int = 100
     tolerance_deg: float = 0.05
@@ -88,6 +87,11 @@ class L1IRLS:
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
 
+    @property
+    def deterministic(self) -> bool:
+        """A random start is not."""
+        return self.init != "random"
+
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
         spectral.compile_and_load()
@@ -96,7 +100,7 @@ class L1IRLS:
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         loss, sigma = LOSSES[self.loss], np.radians(self.sigma_deg)
-        descent = _Descent(problem, self._start(problem), np.radians(self.tolerance_deg))
+        descent = _Descent(problem, start_rotations(self.init, problem, rng), np.radians(self.tolerance_deg))
         if self.init == "spanning-tree":
             descent.step(np.ones(problem.m))
         descent.reweight(LOSSES["l1"], 1.0, self.l1_iterations)
@@ -109,11 +113,6 @@ class L1IRLS:
             stop_reason=f"mean step below {self.tolerance_deg:g} degrees" if converged else "iteration limit",
             cost=float(loss.value(scaled).sum()),
         )
-
-    def _start(self, problem: Problem) -> Floats:
-        if self.init == "spanning-tree":
-            return tree_rotations(problem, problem.weights)
-        return spectral.spectral_rotations(problem, tolerance=START_TOLERANCE)[0]
 
 
 class _Descent:

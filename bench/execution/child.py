@@ -82,7 +82,7 @@ def _solve(request: Request, result: dict[str, Any]) -> Outcome:
     info = _info(request)
     method = info.configure(request.parameters)
     problem = load_problem(Path(request.problem))
-    limit = getattr(method, "max_cameras", info.facts["max_cameras"])
+    limit = info.fact("max_cameras", method)
     if limit is not None and problem.n > limit:
         raise Skipped(f"{problem.n} cameras, and {info.name} is meant for at most {limit}")
     for name in info.requires:
