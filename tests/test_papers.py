@@ -65,6 +65,27 @@ method = "spectral"
 dataset = { clairvoyant = true }
 reference = true
 
+[b]
+kind = "curves"
+title = "Bound"
+dataset = "erdos-renyi[noise=langevin,missing=0,outliers=0.2]"
+statistic = "rms_deg"
+alignment = "chordal"
+panel = { parameter = "n", label = "{} nodes", values = [40] }
+axis = { parameter = "noise_deg", label = "noise", values = [2, 4] }
+
+[[b.curves]]
+label = "least squares"
+method = "l1-irls[loss=l2]"
+dataset = { clairvoyant = true }
+
+[[b.curves]]
+label = "spectral"
+method = "spectral"
+
+[[b.curves]]
+label = "bound"
+
 [c]
 kind = "claims"
 title = "Claims"
@@ -266,6 +287,17 @@ def test_a_figure_with_bands_over_two_seeds(layout_file: Path, tmp_path: Path) -
     one = records[(records["instance"] == "n12-missing0.2-noise1.0") & (records["method"] == "spanning-tree")]
     assert points["mean_deg"].iloc[0] == pytest.approx(one["mean_deg"].mean())
     assert set(records.loc[records["method"] == "spectral", "instance"].str.endswith("-clairvoyant")) == {True}
+
+
+def test_the_bound_is_drawn_where_least_squares_attains_it(layout_file: Path, tmp_path: Path) -> None:
+    done = bench("paper", layout_file, "b", "--seeds", 4, "--out", tmp_path / "run", "--format", "csv")
+    points = pd.read_csv(io.StringIO(done.stdout)).set_index(["noise_deg", "curve"])["rms_deg"].unstack()
+    assert (points["least squares"] / points["bound"]).to_numpy() == pytest.approx(1, abs=0.12)
+    assert (points["bound"] < points["spectral"]).all()
+    assert points["bound"].loc[4] / points["bound"].loc[2] == pytest.approx(2, rel=0.1)
+    records = pd.read_csv(io.StringIO(bench("table", tmp_path / "run", "--align", "chordal", "--format", "csv").stdout))
+    squares = records[records["method"] == "l1-irls"].groupby("instance")["rms_deg"].apply(lambda e: (e**2).mean())
+    assert np.sqrt(squares).tolist() == pytest.approx(points["least squares"].tolist())
 
 
 def test_sentences_are_judged_by_pairs_and_by_independent_samples(layout_file: Path, tmp_path: Path) -> None:

@@ -112,7 +112,8 @@ def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Comput
     store = runs[0].store
     jobs = [cell.job for planned in runs for cell in planned.cells]
     notes = {job.instance: store.instance(key).notes for key, job in {job.instance_key: job for job in jobs}.items()}
-    return Computed(jobs, score(store, rule, jobs=jobs, oracle=isinstance(item, Claims)), notes, tuple(missing))
+    scores = score(store, rule, jobs=jobs, oracle=isinstance(item, Claims))
+    return Computed(jobs, scores, notes, tuple(missing), lambda job: store.instance(job.instance_key))
 
 
 def _print(grid: "Grid", frame: "pd.DataFrame", format: Format) -> None:
