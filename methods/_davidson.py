@@ -8,17 +8,15 @@ import numpy as np
 from bench.problem import Floats, Problem
 
 from ._eigenspace import ROUNDING, Eigenspace
+from .spectral import NARROW, PRECISE, SMALL, bandwidth
 
 if TYPE_CHECKING:
     from scipy import sparse
 
-SMALL = 100  # cameras; up to here LAPACK solves the full problem fastest
-NARROW = 0.2  # bandwidth over cameras, below which the shifted matrix is factored
 SHIFT = 1e-10  # of the factored matrix, relative to its largest diagonal entry
 LARGEST_BASIS = 20  # blocks, before a restart
 KEPT = 4  # blocks of Ritz vectors that survive a restart
 MOST_PRODUCTS = 600
-PRECISE = 1e-9  # radians
 
 
 def block_laplacian(problem: Problem, blocks: Floats) -> "sparse.bsr_array":
@@ -103,15 +101,6 @@ def davidson(
         new = precondition(residuals)
         for _ in range(2):
             new = np.linalg.qr(new - basis[:, :used] @ (basis[:, :used].T @ new))[0]
-
-
-def bandwidth(problem: Problem) -> int:
-    """Largest distance between the ends of an edge in the reverse Cuthill-McKee numbering."""
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
-
-    position = np.empty(problem.n, dtype=np.intp)
-    position[reverse_cuthill_mckee(problem.adjacency(), symmetric_mode=True)] = np.arange(problem.n)
-    return int(np.abs(np.diff(position[problem.edges], axis=1)).max())
 
 
 def _by_lapack(matrix: Floats, block: int) -> Eigenspace:

@@ -9,9 +9,10 @@ from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
 from ._certificate import chordal_cost
-from ._davidson import PRECISE, block_laplacian, smallest_eigenspace
+from ._davidson import block_laplacian, smallest_eigenspace
 from ._eigenspace import Eigenspace
 from .spanning_tree import tree_rotations
+from .spectral import PRECISE
 
 
 @method("martinec-pajdla", title="Martinec-Pajdla", cite="martinec2007", requires=("scipy",))
@@ -25,7 +26,7 @@ class MartinecPajdla:
        when most blocks are reflections, change the sign of one eigenvector.
     3. Replace every block by the nearest rotation.
 
-    Source: Martinec and Pajdla, CVPR 2007, section 3 (there the three right singular vectors of the smallest
+    Source: Martinec and Pajdla, CVPR 2007 (there the three right singular vectors of the smallest
     singular values of the stacked equations). Deviations: none in what is computed. Eigenvectors are found by
     LAPACK up to 100 cameras, else by block Davidson iterations from a spanning tree (see `_davidson`). The weights
     of a problem are not used.

@@ -41,7 +41,7 @@ class NuclearNorm:
     2. The three leading eigenvectors of Z, cut into one block for each camera, are projected to rotations;
        when most blocks are reflections, one eigenvector changes its sign.
 
-    Sources: Candes, Li, Ma and Wright, JACM 2011, section 1.6 (the program, for a matrix of which only some entries are
+    Sources: Candes, Li, Ma and Wright, JACM 2011, theorem 1.2 (the program, for a matrix of which only some entries are
     known and some of those are wrong); Lin, Chen and Ma 2010 (alternating directions). Deviations: the
     diagonal blocks, which are known, are constraints and not measurements; then |Z|_* >= trace Z = 3n, with equality
     for positive semidefinite Z alone, and a noise-free problem is solved exactly, however few its edges. lambda

@@ -8,10 +8,10 @@ from bench import so3
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
-from ._davidson import PRECISE, block_laplacian, smallest_eigenspace
+from ._davidson import block_laplacian, smallest_eigenspace
 from ._eigenspace import Eigenspace
 from ._starts import Start, start_rotations
-from .spectral import compile_and_load
+from .spectral import PRECISE, compile_and_load
 
 SIGNS_TOLERANCE = 1e-3  # radians, of the solutions that only choose signs
 
@@ -38,8 +38,8 @@ class Quaternion:
     3. Choose the signs anew by the solution and solve again, until no sign changes. No step increases the sum.
     4. Divide every q_i by its norm.
 
-    Source: Govindu, CVPR 2001, section 3. Deviations: signs, of which the paper says nothing that survives a graph with
-    cycles; with ``sweeps=1`` they are those of the start. Eigenvectors are found by LAPACK up to 100
+    Source: Govindu, CVPR 2001 (the linear system). Deviations: the choice of signs, steps 1 and 3, is ours; with
+    ``sweeps=1`` they are those of the start. Eigenvectors are found by LAPACK up to 100
     cameras, else by block Davidson iterations (see `_davidson`). The weights of a problem are used by the
     spanning-tree start alone.
 

@@ -40,7 +40,7 @@ class RGoDec:
     4. Repeat 2 and 3 until L stays where it is. The three leading eigenvectors of L, cut into one block
        for each camera, are projected to rotations; when most blocks are reflections, one eigenvector changes its sign.
 
-    Sources: Arrigoni, Magri, Rossi, Fragneto and Fusiello, 3DV 2014, section 4, and Arrigoni, Rossi, Fragneto and
+    Sources: Arrigoni, Magri, Rossi, Fragneto and Fusiello, 3DV 2014, and Arrigoni, Rossi, Fragneto and
     Fusiello, CVIU 2018; lambda is 0.02 (2 log(9 k))^(1/2) for k measured blocks off the diagonal, the limit 100
     iterations. Deviations: the approximation of rank three is found by two steps of subspace iteration from the last
     one, where theirs is by bilateral random projections, so that nothing is random; it ends when L moves by less than
