@@ -116,3 +116,33 @@ def block_product(edges: Ints, matrices: Floats, weights: Floats, diagonal: Floa
             for k in range(3):
                 product[i, a, k] += to_i[0] * x[j, 0, k] + to_i[1] * x[j, 1, k] + to_i[2] * x[j, 2, k]
                 product[j, a, k] += to_j[0] * x[i, 0, k] + to_j[1] * x[i, 1, k] + to_j[2] * x[i, 2, k]
+
+
+@_compiled
+def clipped_product(
+    edges: Ints, matrices: Floats, left: Floats, right: Floats, threshold: float, x: Floats, product: Floats
+) -> None:
+    """Multiply the symmetric block matrix of clipped residuals with three columns, without forming it.
+
+    Parameters
+    ----------
+    edges, matrices
+        (m, 2) and (m, 3, 3). Block (i, j) is R_ij - A_i B_j^T, each entry limited to [-threshold, threshold], block
+        (j, i) its transpose; block (i, i) likewise with the identity for R_ij.
+    left, right
+        (n, 3, 3): the A_i and the B_i, with A_i B_j^T = (A_j B_i^T)^T.
+    x, product
+        (n, 3, 3): the three columns, cut into one block for each camera; `product` is filled.
+    """
+    product[:] = 0
+    for e in range(-x.shape[0], edges.shape[0]):
+        i, j = (edges[e, 0], edges[e, 1]) if e >= 0 else (-1 - e, -1 - e)
+        for a in range(3):
+            for b in range(3):
+                measured = matrices[e, a, b] if e >= 0 else (1.0 if a == b else 0.0)
+                r = measured - left[i, a, 0] * right[j, b, 0] - left[i, a, 1] * right[j, b, 1]
+                r = min(max(r - left[i, a, 2] * right[j, b, 2], -threshold), threshold)
+                for k in range(3):
+                    product[i, a, k] += r * x[j, b, k]
+                    if e >= 0:
+                        product[j, b, k] += r * x[i, a, k]

@@ -112,7 +112,7 @@ def compile_and_load() -> None:
 def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, start: Floats, tolerance: float) -> Eigenspace:
     if problem.n <= SMALL:
         return dense_eigenspace(problem.block_matrix(weights, diagonal).toarray())
-    if _bandwidth(problem) < NARROW * problem.n:
+    if bandwidth(problem) < NARROW * problem.n:
         return leading_eigenspace(_inverse(problem, weights, diagonal, start), start, tolerance)
 
     def multiply(x: Floats) -> Floats:
@@ -124,7 +124,7 @@ def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, start: Floa
     return leading_eigenspace(multiply, start, tolerance)
 
 
-def _bandwidth(problem: Problem) -> int:
+def bandwidth(problem: Problem) -> int:
     """Largest distance between the ends of an edge in the reverse Cuthill-McKee numbering."""
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
