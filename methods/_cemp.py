@@ -1,12 +1,15 @@
 """Cycle-edge message passing: how corrupted each edge is, told from the triangles over it alone."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.problem import Floats, Problem
 
 from . import spectral
 from ._triangles import Triangles
 from .spanning_tree import tree_rotations
+
+Flags = NDArray[np.bool_]
 
 TRIANGLES = 50
 ITERATIONS = 6
@@ -31,16 +34,18 @@ def tree_of_least_corruption(problem: Problem, levels: Floats) -> Floats:
     return tree_rotations(problem, -levels)
 
 
-def graph_weights(levels: Floats, iterations: int = ITERATIONS) -> Floats:
-    """Weights exp(-beta s) of CEMP+GCW (m,), beta being the last of `iterations`; kept above 1e-4.
+def inlier_weights(levels: Floats, iterations: int = ITERATIONS) -> Floats:
+    """Weights exp(-beta s) (m,), beta being the last of `iterations`."""
+    return np.exp(-(2.0 ** (iterations - 1)) * levels)
 
-    The floor is ours. Without it an edge in no triangle, or a camera whose every edge is bad, hangs on a weight of
-    1e-14 and the eigenvectors cannot be separated.
+
+def weighted_spectral(problem: Problem, weights: Floats, alone: Flags) -> Floats:
+    """Rotations (n, 3, 3) of CEMP+GCW: the spectral solution with `weights` (m,), normalised by those of each camera.
+
+    Edges `alone` (m,), in no triangle, get the median weight of the others: of them nothing is known, and where two
+    parts of a graph hang together by such edges only, a weight of exp(-beta) would let the eigenvectors choose one
+    part. For the same reason no weight is below 1e-4.
     """
-    last = 2.0 ** (iterations - 1) if iterations else 0.0
-    return np.maximum(np.exp(-last * levels), SMALLEST_WEIGHT)
-
-
-def weighted_spectral(problem: Problem, weights: Floats) -> Floats:
-    """Rotations (n, 3, 3) of the spectral solution with `weights` (m,), normalised by the weights of each camera."""
+    usual = 1.0 if alone.all() else np.median(weights[~alone])
+    weights = np.maximum(np.where(alone, usual, weights), SMALLEST_WEIGHT)
     return spectral.spectral_rotations(problem, weights)[0]

@@ -9,7 +9,7 @@ from ._triangles import Triangles
 
 
 def consistent_levels(triangles: Triangles, rate: float, iterations: int) -> Floats:
-    """Corruption levels s (m,) after descending on f(w) = sum_ij sum_k w_ij,k (s_ik + s_jk), s_ij = sum_k w_ij,k d_ij,k.
+    """Corruption levels s (m,) of the edges, s_ij = sum_k w_ij,k d_ij,k, after descending on the objective of `DESC`.
 
     The w of an edge stay on the simplex, where they start equal. The derivative with respect to w_ij,k is
     s_ik + s_jk + c_ij d_ij,k, c_ij being the sum of the w of all triangles that have edge ij as a side. An edge in no

@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench import so3
 from bench.problem import Floats, Ints, Problem
@@ -32,6 +33,11 @@ class Triangles:
     counts: Ints
     sides: Ints
     inconsistency: Floats
+
+    @property
+    def missing(self) -> NDArray[np.bool_]:
+        """(m,) whether an edge is in no triangle."""
+        return self.counts == 0
 
     def weighted_means(self, values: Floats) -> Floats:
         """Mean (m,) inconsistency of the triangles over each edge, weighted by the product of the sides' `values`.

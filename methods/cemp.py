@@ -14,7 +14,7 @@ from ._cemp import (
     MOST_ITERATIONS,
     TRIANGLES,
     corruption_levels,
-    graph_weights,
+    inlier_weights,
     tree_of_least_corruption,
     weighted_spectral,
 )
@@ -34,7 +34,8 @@ class CEMP:
        weighted by exp(-beta s_ij), with the last beta, normalised by the weights of each camera.
 
     Source: Lerman and Shi, FoCM 2022 (algorithm 1), with the schedule and the two solvers of Shi and Lerman, ICML
-    2020, section 4. Deviations: triangles are drawn without replacement; in "gcw" weights are kept above 1e-4, and
+    2020, section 4. Deviations: triangles are drawn without replacement; in "gcw" edges in no triangle get the median
+    weight of the others (else parts that hang together by such edges fall apart), weights are kept above 1e-4, and
     each camera has an identity block of the mean weight of its edges. The weights of a problem are not used.
 
     The edge weights of the estimate are exp(-beta s_ij), for either solver.
@@ -67,10 +68,11 @@ class CEMP:
         self.solve(two_cameras, np.random.default_rng())
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
-        levels = corruption_levels(sample_triangles(problem, self.triangles, rng), self.iterations)
-        weights = graph_weights(levels, self.iterations)
+        triangles = sample_triangles(problem, self.triangles, rng)
+        levels = corruption_levels(triangles, self.iterations)
+        weights = inlier_weights(levels, self.iterations)
         if self.solver == "mst":
             rotations = tree_of_least_corruption(problem, levels)
         else:
-            rotations = weighted_spectral(problem, weights)
+            rotations = weighted_spectral(problem, weights, triangles.missing)
         return Estimate(rotations, edge_weights=weights, iterations=self.iterations, stop_reason="every iteration done")

@@ -9,7 +9,7 @@ from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
 from . import spectral
-from ._cemp import graph_weights, weighted_spectral
+from ._cemp import inlier_weights, weighted_spectral
 from ._cycle_refinement import refined
 from ._simplex_descent import consistent_levels
 from ._starts import Start, start_rotations
@@ -26,27 +26,26 @@ class DESC:
     1. Take up to `triangles` triangles over each edge and their inconsistencies d_ij,k, the angle of R_ij R_jk R_ki
        divided by pi. The w_ij,k >= 0 of an edge sum to one; they start equal.
     2. `descent_iterations` steps of projected gradient descent on the objective. An edge in no triangle keeps s = 1.
-    3. Start from `init`, by default the spectral solution with each block weighted by exp(-32 s_ij).
+    3. Start from `init`, by default the spectral solution with each block weighted by exp(-32 s_ij), as in `CEMP`.
     4. Weighted least squares in the tangent space, first with weights s^(-3/2), then
        (s_ij / (t + 1) + r_ij t / (t + 1))^(-3/2) in iteration t, r being residuals divided by pi; the worst edges, up
        to a fifth, are left out. Until the mean step is below the tolerance.
 
-    Source: Shi, Wyeth and Lerman, ICML 2022 (section 4; the refinement is that of the authors' code). Deviations: the
-    gradient counts every triangle sampled over any edge (theirs only those sampled over both edges in question), and
-    the descent makes all its steps (theirs may stop when the objective stalls); an edge in no triangle counts with its
-    residual alone in step 4; weights of the blocks are kept above 1e-4, and those of least squares above 1e-10 of the
-    largest (there 1e-8, absolute); residuals are those of the moved cameras, and the mean step is removed instead of
-    anchoring a camera. The weights of a problem are not used, except by the spanning-tree start.
+    Source: Shi, Wyeth and Lerman, ICML 2022 (the quadratic program; the refinement is that of the authors' code).
+    Deviations: the gradient counts every triangle sampled over any edge (theirs only those sampled over both edges in
+    question), and the descent makes all its steps (theirs may stop when the objective stalls); an edge in no triangle
+    counts with the median weight in step 3 and with its residual alone in step 4; weights of the blocks are kept above
+    1e-4, and those of least squares above 1e-10 of the largest (there 1e-8, absolute); residuals are those of the moved
+    cameras, and the mean step is removed instead of anchoring a camera. The weights of a problem are not used, except
+    by the spanning-tree start.
 
     Parameters
     ----------
     triangles
         How many triangles an edge has at most, drawn at random where it has more; by default a quarter of the median
         number over the edges in any, and no fewer than 30.
-    rate
-        Step of the descent.
-    descent_iterations
-        How many steps.
+    rate, descent_iterations
+        Size and number of the steps of the descent. The authors also use 1 and 30, on large real scenes.
     init
         Where to start: "gcw" as in step 3, the others see `start_rotations`.
     iterations
@@ -68,6 +67,16 @@ class DESC:
             if getattr(self, name) is not None and not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
 
+    @property
+    def exact_to_deg(self) -> float:
+        """From a random start only as near as the last step tells."""
+        return self.tolerance_deg if self.init == "random" else 1e-6
+
+    @property
+    def invariant_to_deg(self) -> float | None:
+        """A random start ends in whichever minimum is near."""
+        return None if self.init == "random" else 1e-3
+
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
         spectral.compile_and_load()
@@ -78,13 +87,12 @@ class DESC:
         triangles = sample_triangles(problem, self.triangles or _quarter_of_the_median(problem), rng)
         levels = consistent_levels(triangles, self.rate, self.descent_iterations)
         if self.init == "gcw":
-            start = weighted_spectral(problem, graph_weights(levels))
+            start = weighted_spectral(problem, inlier_weights(levels), triangles.missing)
         else:
             start = start_rotations(self.init, problem, rng)
-        alone = triangles.counts == 0
 
         def by_cycles(residuals: Floats) -> Floats:
-            return np.where(alone, residuals, levels)
+            return np.where(triangles.missing, residuals, levels)
 
         return refined(problem, start, levels, by_cycles, self.tolerance_deg, self.iterations)
 

@@ -56,6 +56,16 @@ class MPLS:
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
 
+    @property
+    def exact_to_deg(self) -> float:
+        """From a random start only as near as the last step tells."""
+        return self.tolerance_deg if self.init == "random" else 1e-6
+
+    @property
+    def invariant_to_deg(self) -> float | None:
+        """A random start ends in whichever minimum is near."""
+        return None if self.init == "random" else 1e-3
+
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
         spectral.compile_and_load()
@@ -69,9 +79,8 @@ class MPLS:
             start = tree_of_least_corruption(problem, levels)
         else:
             start = start_rotations(self.init, problem, rng)
-        alone = triangles.counts == 0
 
         def by_cycles(residuals: Floats) -> Floats:
-            return np.where(alone, residuals, triangles.weighted_means(np.exp(-BETA * residuals)))
+            return np.where(triangles.missing, residuals, triangles.weighted_means(np.exp(-BETA * residuals)))
 
         return refined(problem, start, levels, by_cycles, self.tolerance_deg, self.iterations)
