@@ -12,7 +12,7 @@ from bench.registry import method
 from . import _edge_kernels, spectral
 from ._laplacian import LaplacianSolver
 from ._losses import LOSSES, Loss
-from ._starts import Start, start_rotations
+from ._starts import SEEDED, Start, start_rotations
 
 SMALLEST_WEIGHT = 1e-10  # relative to the largest
 
@@ -89,8 +89,8 @@ class L1IRLS:
 
     @property
     def deterministic(self) -> bool:
-        """A random start is not."""
-        return self.init != "random"
+        """A start that draws from the generator is not."""
+        return self.init not in SEEDED
 
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""

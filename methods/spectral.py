@@ -79,7 +79,8 @@ def spectral_rotations(
     problem
         A connected problem.
     edge_weights
-        (m,) positive, by default ones. The diagonal blocks get the largest.
+        (m,) positive, by default ones. The diagonal block of each camera gets their mean over its edges when
+        `normalised` (a larger one would cut off a camera whose edges all weigh little), else the largest of all.
     normalised
         As in `Spectral`, D being the sum of the weights of a camera, its diagonal block included.
     tolerance
@@ -89,7 +90,9 @@ def spectral_rotations(
     diagonal = np.full(problem.n, weights.max())
     start = tree_rotations(problem, edge_weights)
     if normalised:
-        scale = 1 / np.sqrt(diagonal + np.bincount(problem.edges.ravel(), np.repeat(weights, 2)))
+        sums = np.bincount(problem.edges.ravel(), np.repeat(weights, 2))
+        diagonal = sums / problem.degree
+        scale = 1 / np.sqrt(diagonal + sums)
         weights = weights * scale[problem.edges].prod(axis=1)
         diagonal = diagonal * scale**2
         start = start / scale[:, None, None]

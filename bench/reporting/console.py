@@ -11,7 +11,19 @@ from rich.table import Table
 from rich.text import Text
 
 from bench.reporting.grid import Grid
-from bench.reporting.rows import TIE_LEGEND, Entry, Scene, Ties, Value, degrees, scenes, seconds, times_note
+from bench.reporting.rows import (
+    ROC_LEGEND,
+    TIE_LEGEND,
+    Entry,
+    Scene,
+    Ties,
+    Value,
+    area,
+    degrees,
+    scenes,
+    seconds,
+    times_note,
+)
 
 NO_TRUTH = " · no ground truth: edge residuals, not errors"
 WIDE = 96  # columns from which the 90th percentile and the share under 5 degrees fit
@@ -84,6 +96,8 @@ def _table(scene: Scene, entries: Iterable[Entry], width: int) -> Table:
     columns = [(f"{of}mean_deg", "mean °"), (f"{of}median_deg", "median °")]
     if scene.has_truth and width >= WIDE and not several:
         columns += [("p90_deg", "p90 °"), ("within_5_deg", "<5°")]
+    if scene.has_roc:
+        columns.append(("roc_auc", "AUC"))
     columns += [("solve_s", "time s"), ("peak_mib", "MiB")]
     table = _empty_table()
     table.add_column("  method", overflow="fold", min_width=16)
@@ -118,6 +132,8 @@ def _cell(value: Value, name: str) -> str:
         return f"{100 * value.mean:.0f} %" if value.known else "–"
     if name == "solve_s":
         return seconds(value.mean)
+    if name == "roc_auc":
+        return area(value.mean)
     if name == "peak_mib":
         return f"{value.mean:.0f}" if value.known else "–"
     spread = f" ±{degrees(value.half_width)}" if math.isfinite(value.half_width) else ""
@@ -142,6 +158,8 @@ def _legend(frame: pd.DataFrame) -> list[str]:
     ]
     if frame["seed"].nunique() > 1:
         lines.append("means over the seeds that ended well, ± half-width of the 95 % t interval over seeds")
+    if "roc_auc" in frame and frame["roc_auc"].notna().any():
+        lines.append(f"AUC: {ROC_LEGEND}")
     return lines
 
 
