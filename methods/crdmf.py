@@ -52,6 +52,10 @@ class CRDMF:
     diagonal; a candidate is judged by its rotations, not by the projected blocks of E; one sign for all cameras, not
     one for each, decides on reflections.
 
+    The median in step 1 means something as long as most triangles close. With 40 % of uniformly random measurements
+    only a fifth do, the tree is poor and the filter removes true edges (60 cameras, half of the edges: mean error 29
+    degrees); with 15 % all is well.
+
     The loss is that of the matrix entries: turning all frames by one rotation moves the answer on noisy data (by less
     than 4 degrees on the twelve cameras of the conformance checks; ten rounds of reweighting amplify it).
 

@@ -49,8 +49,8 @@ class TGMCMC:
         Standard deviation of a measurement about an axis at the first temperature: beta = 2 / noise^2. Zero leaves out
         all noise.
     step
-        h. Explicit steps are stable below 1, but above (pi (1 - keep) / 2)^(1/2) two cameras that spin by half a turn in
-        every step can spin for ever.
+        h. Explicit steps are stable below 1, but above (pi (1 - keep) / 2)^(1/2) two cameras that turn against each
+        other by a full turn in every step can go on for ever.
     keep
         e^(-c h), the share of the velocity that a step leaves: at least 0, below 1.
     cooling

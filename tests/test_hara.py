@@ -87,7 +87,7 @@ def test_noise_free_problems_are_solved_exactly(edges: Ints) -> None:
 
 
 def test_outliers_are_filtered() -> None:
-    problem, truth = simulated(DENSE, noise_deg=2, outliers=0.4)
+    problem, truth = simulated(DENSE, noise_deg=2, outliers=0.15)
     estimate = HARA().solve(problem, RNG)
     assert errors_deg(estimate.rotations, truth).mean() < 1
     assert estimate.edge_weights is not None
@@ -95,6 +95,13 @@ def test_outliers_are_filtered() -> None:
     removed = estimate.edge_weights == 0
     assert removed[true_residuals > np.radians(60)].all()
     assert not removed[true_residuals < np.radians(20)].any()
+
+
+def test_many_outliers_turn_the_filter_off() -> None:
+    problem, truth = simulated(DENSE, noise_deg=2, outliers=0.4)
+    estimate = HARA().solve(problem, RNG)
+    assert "no edge was filtered: most triangles are far from closing" in estimate.notes
+    assert errors_deg(estimate.rotations, truth).mean() < 1.5
 
 
 def test_without_a_filter_it_ends_where_l1_irls_does() -> None:

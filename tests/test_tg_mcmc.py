@@ -89,8 +89,12 @@ def test_its_cost_is_shonans() -> None:
     from bench.methods.shonan import Shonan
 
     problem, _ = simulated(GRAPHS["sparse"], noise_deg=5, outliers=0.05)
-    wanted = Shonan(loss="l2").solve(problem, rng()).cost
-    assert TGMCMC().solve(problem, rng()).cost == pytest.approx(wanted, rel=1e-5)
+    shonans = Shonan(loss="l2").solve(problem, rng()).cost
+    cost = TGMCMC().solve(problem, rng()).cost
+    assert shonans is not None
+    assert cost is not None
+    assert cost == pytest.approx(shonans, rel=1e-4)
+    assert cost < shonans * (1 + 1e-9)
 
 
 def test_labels_and_edge_order_do_not_matter() -> None:
