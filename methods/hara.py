@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench import so3
 from bench.problem import Estimate, Floats, Problem
@@ -94,7 +95,7 @@ class HARA:
                 notes.append(f"{len(bridges)} edges beyond the filter were kept to connect all cameras")
         return self._refined(problem, tree.rotations, kept, tuple(notes))
 
-    def _refined(self, problem: Problem, start: Floats, kept: "np.ndarray", notes: tuple[str, ...]) -> Estimate:
+    def _refined(self, problem: Problem, start: Floats, kept: NDArray[np.bool_], notes: tuple[str, ...]) -> Estimate:
         loss = LOSSES["l-half"]
         filtered = Problem(problem.n, problem.edges[kept], problem.rotations[kept])
         descent = _Descent(filtered, start, np.radians(self.tolerance_deg))
@@ -114,7 +115,7 @@ class HARA:
         )
 
 
-def _connecting(problem: Problem, residuals: Floats, kept: "np.ndarray") -> "np.ndarray":
+def _connecting(problem: Problem, residuals: Floats, kept: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Edges outside `kept`, of the smallest residuals, that a connected graph needs beside those."""
     if Problem(problem.n, problem.edges[kept], problem.rotations[kept]).components.max() == 0:
         return np.zeros(0, dtype=np.intp)
