@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from bench import so3
 from bench.problem import Floats, Ints, Problem
 
+from ._all_triangles import AllTriangles
 from ._edge_kernels import _compiled
-from ._triangles import Triangles
 
 MEDIAN_ITERATIONS = 10
 MEDIAN_TOLERANCE = 1e-3  # radians
@@ -24,7 +24,7 @@ class Tree:
     averaged: int
 
 
-def support_levels(problem: Problem, triangles: Triangles, thresholds: Floats, most: int) -> Ints:
+def support_levels(problem: Problem, triangles: AllTriangles, thresholds: Floats, most: int) -> Ints:
     """(m,) rank of each edge, 0 for the best supported.
 
     An edge has rank (most - s) * k + q when s of its triangles, or more where s = `most`, have an error of at most

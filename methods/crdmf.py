@@ -11,9 +11,9 @@ from bench.problem import Checkpoint, Estimate, Floats, Problem
 from bench.registry import method
 
 from . import _crdmf_dense, _dmf_thin, spectral
+from ._all_triangles import AllTriangles
 from ._dmf_thin import Factors, Observed, nearest_rotations
 from ._starts import Start, start_rotations
-from ._triangles import Triangles
 from .spanning_tree import propagated, tree_edges
 
 DEPTHS = (1, 2, 3, 4, 2, 3, 1, 2, 3, 4)  # of the published ten candidates, the different ones first
@@ -222,7 +222,7 @@ class CRDMF:
 
 def agrees_with_tree(problem: Problem) -> NDArray[np.bool_]:
     """(m,) whether each edge is nearer than `FILTER` to the prediction of the tree of largest triangle support."""
-    triangles = Triangles.of(problem)
+    triangles = AllTriangles.of(problem)
     closing = triangles.errors < np.median(triangles.errors) if len(triangles.errors) else np.zeros(0, dtype=np.bool_)
     by_support = np.lexsort((-triangles.mean_distance(problem.m), triangles.support(closing, problem.m)))
     ranks = np.empty(problem.m)

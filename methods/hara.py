@@ -9,9 +9,9 @@ from bench import so3
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
+from ._all_triangles import AllTriangles
 from ._hierarchical_tree import hierarchical_tree, support_levels
 from ._losses import LOSSES
-from ._triangles import Triangles
 from .l1_irls import _Descent
 from .spanning_tree import tree_edges
 
@@ -77,7 +77,7 @@ class HARA:
         self.solve(triangle, np.random.default_rng())
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
-        triangles = Triangles.of(problem)
+        triangles = AllTriangles.of(problem)
         usual = triangles.errors[triangles.errors < USUAL_ERROR]
         thresholds = np.maximum(np.quantile(usual, QUANTILES), ROUNDING) if len(usual) else np.zeros(0)
         levels = support_levels(problem, triangles, thresholds, self.support)

@@ -8,8 +8,8 @@ import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
 from bench import so3
+from bench.methods._all_triangles import AllTriangles
 from bench.methods._hierarchical_tree import chordal_l1_mean, hierarchical_tree, support_levels
-from bench.methods._triangles import Triangles
 from bench.methods.hara import HARA
 from bench.methods.l1_irls import L1IRLS
 from bench.methods.spanning_tree import SpanningTree
@@ -28,7 +28,7 @@ GRAPHS = {
 
 def test_triangles_are_all_triangles_with_their_errors() -> None:
     problem, _ = simulated(random_edges(12, 0.5), outliers=0.5)
-    found = Triangles.of(problem)
+    found = AllTriangles.of(problem)
     measured = {(int(i), int(j)): r for (i, j), r in zip(problem.edges, problem.rotations, strict=True)}
     wanted = {}
     for i, j, k in itertools.combinations(range(12), 3):
@@ -53,10 +53,10 @@ def test_levels_put_support_before_thresholds() -> None:
     bad = np.flatnonzero((complete == [0, 1]).all(axis=1))
     rotations = problem.rotations.copy()
     rotations[bad] = so3.exp(np.array([0.3, 0.0, 0.0])) @ rotations[bad]
-    triangles = Triangles.of(Problem(4, complete, rotations))
+    triangles = AllTriangles.of(Problem(4, complete, rotations))
     levels = support_levels(problem, triangles, np.array([1e-6, 1.0]), most=2)
     for (i, j), level in zip(complete.tolist(), levels, strict=True):
-        # Triangles 012 and 013 close at the loose threshold only, 023 and 123 at both.
+        # AllTriangles 012 and 013 close at the loose threshold only, 023 and 123 at both.
         wanted = 1 if (i, j) == (0, 1) else 0 if (i, j) == (2, 3) else 1
         assert level == wanted
 
@@ -64,7 +64,7 @@ def test_levels_put_support_before_thresholds() -> None:
 def test_the_tree_prefers_supported_edges() -> None:
     """Two groups joined by edges of which one is wrong: no triangle supports it."""
     problem, truth = simulated(random_edges(20, 0.7), outliers=0.3)
-    triangles = Triangles.of(problem)
+    triangles = AllTriangles.of(problem)
     levels = support_levels(problem, triangles, np.array([1e-6]), most=10)
     tree = hierarchical_tree(problem, levels, 10)
     assert errors_deg(tree.rotations, truth).max() < 1e-4

@@ -14,7 +14,7 @@ Single = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Triangles:
+class AllTriangles:
     """Three cameras i < j < k with all three edges measured.
 
     Parameters
@@ -29,7 +29,7 @@ class Triangles:
     errors: Single
 
     @classmethod
-    def of(cls, problem: Problem) -> "Triangles":
+    def of(cls, problem: Problem) -> "AllTriangles":
         """Find all triangles of a problem, in time proportional to the number of two-edge paths."""
         by_camera = np.lexsort((problem.edges[:, 1], problem.edges[:, 0])).astype(np.int32)
         i, other = problem.edges[by_camera].T
@@ -91,7 +91,7 @@ def fill_triangles(
     starts
         (n + 1,) where the triangles of each first camera begin.
     edges, errors
-        Filled, see `Triangles`.
+        Filled, see `AllTriangles`.
     """
     n = len(first) - 1
     place = np.full(n, -1)
