@@ -33,6 +33,13 @@ CONFIGURATIONS = [
     "dmf-synch[depth=[2,3,5]]",
     "dmf-synch[loss=[l1,l2]]",
     "dmf-synch[preset=dense]",
+    "hara",
+    "hara[filter_deg=180,irls_iterations=0]",
+    "tg-mcmc",
+    "tg-mcmc[init=[spectral,random],noise_deg=0]",
+    "crdmf",
+    "crdmf[init=[spanning-tree,random],candidates=1]",
+    "crdmf[preset=paper,candidates=2,iterations=500]",
 ]
 
 
