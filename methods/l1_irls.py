@@ -1,7 +1,6 @@
 """L1-IRLS: robust rotation averaging in the tangent space."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -11,25 +10,10 @@ from bench.registry import method
 
 from . import _edge_kernels, spectral
 from ._laplacian import LaplacianSolver
-from ._losses import LOSSES, Loss
+from ._losses import LOSSES, Loss, LossName
 from ._starts import Start, start_rotations
 
 SMALLEST_WEIGHT = 1e-10  # relative to the largest
-
-LossName = Literal[
-    "geman-mcclure",
-    "l-half",
-    "l1",
-    "l2",
-    "huber",
-    "pseudo-huber",
-    "cauchy",
-    "welsch",
-    "andrews",
-    "bisquare",
-    "fair",
-    "talwar",
-]
 
 
 @method("l1-irls", title="L1-IRLS", cite="chatterjee2018", requires=("scipy", "numba"), robust=True)
@@ -59,8 +43,8 @@ class L1IRLS:
     Parameters
     ----------
     sigma_deg
-        Scale of the noise; each loss multiplies it by its own tuning constant. l1, l2 and l-half have no
-        scale.
+        Scale of the noise; each loss multiplies it by its own tuning constant. l1, l1.5, l2 and
+        l-half have no scale.
     loss
         Loss of the second stage.
     init
