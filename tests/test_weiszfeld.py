@@ -52,7 +52,7 @@ def test_a_general_optimizer_finds_no_lower_cost(init: Start) -> None:
 
 @EVERY_START
 def test_outliers_are_rejected(init: Start) -> None:
-    problem, truth = simulated(DENSE, outliers=0.3)
+    problem, truth = simulated(DENSE, outliers=0.2)
     estimate = Weiszfeld(init=init, tolerance_deg=1e-6).solve(problem, RNG)
     assert errors_deg(estimate.rotations, truth).max() < 0.01
 
