@@ -17,6 +17,27 @@ SEEDED = ("cemp-mst", "random")  # starts that draw from the generator, so that 
 TOLERANCE = 1e-2  # radians between the eigenspace found and the true one; a start need not be better
 
 
+class Started:
+    """Promises of a method that depend on its start: a random one may end in another local minimum."""
+
+    init: Start
+
+    @property
+    def deterministic(self) -> bool:
+        """A start that draws from the generator is not."""
+        return self.init not in SEEDED
+
+    @property
+    def exact_to_deg(self) -> float:
+        """Of no use (180) from a random start."""
+        return 180.0 if self.init == "random" else 1e-6
+
+    @property
+    def invariant_to_deg(self) -> float | None:
+        """Nothing from a random start."""
+        return None if self.init == "random" else 1e-3
+
+
 def start_rotations(name: Start, problem: Problem, rng: np.random.Generator) -> Floats:
     """Rotations (n, 3, 3) to start from.
 

@@ -56,7 +56,7 @@ def test_levels_put_support_before_thresholds() -> None:
     triangles = AllTriangles.of(Problem(4, complete, rotations))
     levels = support_levels(problem, triangles, np.array([1e-6, 1.0]), most=2)
     for (i, j), level in zip(complete.tolist(), levels, strict=True):
-        # AllTriangles 012 and 013 close at the loose threshold only, 023 and 123 at both.
+        # Triangles 012 and 013 close at the loose threshold only, 023 and 123 at both.
         wanted = 1 if (i, j) == (0, 1) else 0 if (i, j) == (2, 3) else 1
         assert level == wanted
 
