@@ -82,7 +82,7 @@ def test_a_local_minimum_is_left_or_known_for_what_it_is(monkeypatch: pytest.Mon
     else:
         assert estimate.cost == pytest.approx(0, abs=1e-8)
     if module == "staircase":
-        assert estimate.stop_reason == "certified at p = 4"
+        assert estimate.stop_reason.startswith("certified at p = ")
         stuck = Staircase(p_max=3).solve(problem, RNG)
         assert "not certified up to p=3" in stuck.notes[0]
         assert stuck.cost == pytest.approx(chordal_cost(problem, local))
