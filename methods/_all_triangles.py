@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from bench import so3
 from bench.problem import Floats, Ints, Problem
 
-from ._edge_kernels import _compiled
+from ._edge_kernels import compiled
 
 Single = NDArray[np.float32]
 
@@ -54,7 +54,7 @@ class AllTriangles:
         return sums / np.maximum(np.bincount(self.edges.ravel(), minlength=m), 1)
 
 
-@_compiled
+@compiled
 def count_triangles(first: Ints, other: Ints, counts: NDArray[np.int64]) -> None:
     """Count the triangles whose first camera is i.
 
@@ -76,7 +76,7 @@ def count_triangles(first: Ints, other: Ints, counts: NDArray[np.int64]) -> None
                     counts[i] += 1
 
 
-@_compiled
+@compiled
 def fill_triangles(
     first: Ints, other: Ints, ids: Ints, measured: Floats, starts: NDArray[np.int64], edges: Ints, errors: Single
 ) -> None:

@@ -15,7 +15,7 @@ from bench.problem import Floats, Ints
 P = ParamSpec("P")
 
 
-def _compiled(loop: Callable[P, None]) -> Callable[P, None]:
+def compiled(loop: Callable[P, None]) -> Callable[P, None]:
     @functools.cache
     def machine_code() -> Callable[P, None]:
         import numba
@@ -29,7 +29,7 @@ def _compiled(loop: Callable[P, None]) -> Callable[P, None]:
     return call
 
 
-@_compiled
+@compiled
 def edge_residuals(edges: Ints, measured: Floats, cameras: Floats, vectors: Floats, angles: Floats) -> None:
     """Rotation vectors of R_i^T R_ij R_j, the residual of each edge seen in the world frame.
 
@@ -66,7 +66,7 @@ def edge_residuals(edges: Ints, measured: Floats, cameras: Floats, vectors: Floa
         angles[e] = angle
 
 
-@_compiled
+@compiled
 def divergence(edges: Ints, weights: Floats, vectors: Floats, degrees: Floats, sums: Floats) -> None:
     """Sum what the edges of each camera carry.
 
@@ -91,7 +91,7 @@ def divergence(edges: Ints, weights: Floats, vectors: Floats, degrees: Floats, s
             sums[j, k] -= flow
 
 
-@_compiled
+@compiled
 def block_product(edges: Ints, matrices: Floats, weights: Floats, diagonal: Floats, x: Floats, product: Floats) -> None:
     """Multiply the symmetric block matrix of the measurements with three columns, without forming it.
 
@@ -118,7 +118,7 @@ def block_product(edges: Ints, matrices: Floats, weights: Floats, diagonal: Floa
                 product[j, a, k] += to_j[0] * x[i, 0, k] + to_j[1] * x[i, 1, k] + to_j[2] * x[i, 2, k]
 
 
-@_compiled
+@compiled
 def clipped_product(
     edges: Ints, matrices: Floats, left: Floats, right: Floats, threshold: float, x: Floats, product: Floats
 ) -> None:

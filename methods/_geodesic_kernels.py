@@ -4,10 +4,10 @@ import math
 
 from bench.problem import Floats, Ints
 
-from ._edge_kernels import _compiled
+from ._edge_kernels import compiled
 
 
-@_compiled
+@compiled
 def bingham_forces(edges: Ints, measured: Floats, cameras: Floats, forces: Floats, energy: Floats) -> None:
     """Energy sum_ij 1 - <q_ij, q_i conj(q_j)>^2 and minus its gradient.
 
@@ -42,7 +42,7 @@ def bingham_forces(edges: Ints, measured: Floats, cameras: Floats, forces: Float
         forces[j, 3] += pull * (w * d - x * c + y * b - z * a)
 
 
-@_compiled
+@compiled
 def geodesic_step(
     cameras: Floats, velocities: Floats, forces: Floats, masses: Floats, kicks: Floats, keep: float, h: float
 ) -> None:

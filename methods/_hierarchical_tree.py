@@ -9,7 +9,7 @@ from bench import so3
 from bench.problem import Floats, Ints, Problem
 
 from ._all_triangles import AllTriangles
-from ._edge_kernels import _compiled
+from ._edge_kernels import compiled
 
 MEDIAN_ITERATIONS = 10
 MEDIAN_TOLERANCE = 1e-3  # radians
@@ -104,7 +104,7 @@ class _Growth:
         self._outside[self._other[self._first[camera] : self._first[camera + 1]]] -= 1
 
 
-@_compiled
+@compiled
 def grow_tree(
     first: Ints,
     other: Ints,

@@ -4,7 +4,7 @@ import numpy as np
 
 from bench.problem import Floats, Ints
 
-from ._edge_kernels import _compiled
+from ._edge_kernels import compiled
 from ._triangles import Triangles
 
 
@@ -26,7 +26,7 @@ def consistent_levels(triangles: Triangles, rate: float, iterations: int) -> Flo
     return state[:, 0].copy()
 
 
-@_compiled
+@compiled
 def _descend(
     counts: Ints, sides: Ints, inconsistency: Floats, rate: float, state: Floats, shares: Floats, following: Floats
 ) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bench import so3
 from bench.problem import Floats, Ints, Problem
 
-from ._edge_kernels import _compiled
+from ._edge_kernels import compiled
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def _neighbours(problem: Problem) -> tuple[Ints, Ints, Ints]:
     return lists.indptr, lists.indices, lists.data.astype(np.int32) - 1
 
 
-@_compiled
+@compiled
 def _count(offsets: Ints, neighbours: Ints, ids: Ints, counts: Ints) -> None:
     n = offsets.shape[0] - 1
     marked = np.zeros(n, dtype=np.bool_)
@@ -102,7 +102,7 @@ def _count(offsets: Ints, neighbours: Ints, ids: Ints, counts: Ints) -> None:
         marked[neighbours[offsets[i] : offsets[i + 1]]] = False
 
 
-@_compiled
+@compiled
 def _sample(offsets: Ints, neighbours: Ints, ids: Ints, seed: int, counts: Ints, sides: Ints) -> None:
     n, most = offsets.shape[0] - 1, sides.shape[1]
     to_i = np.full(n, -1, dtype=np.int32)
@@ -134,7 +134,7 @@ def _sample(offsets: Ints, neighbours: Ints, ids: Ints, seed: int, counts: Ints,
         to_i[neighbours[offsets[i] : offsets[i + 1]]] = -1
 
 
-@_compiled
+@compiled
 def _cycle_angles(edges: Ints, measured: Floats, counts: Ints, sides: Ints, angles: Floats) -> None:
     """Angle between R_ij R_jk and R_ik, from the chord between their quaternions."""
     for e in range(edges.shape[0]):
@@ -155,7 +155,7 @@ def _cycle_angles(edges: Ints, measured: Floats, counts: Ints, sides: Ints, angl
             angles[e, t] = 4 * math.asin(min(1.0, math.sqrt(p * p + q * q + r * r + s * s) / 2))
 
 
-@_compiled
+@compiled
 def _weighted_means(counts: Ints, sides: Ints, inconsistency: Floats, values: Floats, means: Floats) -> None:
     for e in range(counts.shape[0]):
         total = weighted = 0.0
