@@ -13,7 +13,7 @@ from bench.registry import method
 from . import _crdmf_dense, _dmf_thin, spectral
 from ._all_triangles import AllTriangles
 from ._dmf_thin import Factors, Observed, nearest_rotations
-from ._starts import Start, start_rotations
+from ._starts import SEEDED, Start, start_rotations
 from .spanning_tree import propagated, tree_edges
 
 DEPTHS = (1, 2, 3, 4, 2, 3, 1, 2, 3, 4)  # of the published ten candidates, the different ones first
@@ -111,7 +111,7 @@ class CRDMF:
     @property
     def deterministic(self) -> bool:
         """The thin form draws nothing but a random start."""
-        return self.preset == "thin" and self.init != "random"
+        return self.preset == "thin" and self.init not in SEEDED
 
     @property
     def exact_to_deg(self) -> float:

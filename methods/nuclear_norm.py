@@ -9,7 +9,7 @@ from bench import so3
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
-from ._starts import Start, start_rotations
+from ._starts import SEEDED, Start, start_rotations
 from .spectral import compile_and_load
 
 SMALL = 60  # cameras; up to here LAPACK finds all eigenvectors fastest
@@ -83,8 +83,8 @@ class NuclearNorm:
 
     @property
     def deterministic(self) -> bool:
-        """A random start is not."""
-        return self.init != "random"
+        """A start that draws from the generator is not."""
+        return self.init not in SEEDED
 
     def warm_up(self) -> None:
         """Compile what the spectral start uses and load scipy."""

@@ -10,7 +10,7 @@ from bench.registry import method
 
 from ._davidson import block_laplacian, smallest_eigenspace
 from ._eigenspace import Eigenspace
-from ._starts import Start, start_rotations
+from ._starts import SEEDED, Start, start_rotations
 from .spectral import PRECISE, compile_and_load
 
 SIGNS_TOLERANCE = 1e-3  # radians, of the solutions that only choose signs
@@ -64,8 +64,8 @@ class Quaternion:
 
     @property
     def deterministic(self) -> bool:
-        """A random start is not."""
-        return self.init != "random"
+        """A start that draws from the generator is not."""
+        return self.init not in SEEDED
 
     def warm_up(self) -> None:
         """Compile what the spectral start uses and load scipy."""

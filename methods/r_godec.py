@@ -10,7 +10,7 @@ from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
 from . import _edge_kernels
-from ._starts import TOLERANCE, Start, start_rotations
+from ._starts import SEEDED, TOLERANCE, Start, start_rotations
 from .spectral import compile_and_load, spectral_rotations
 
 SUBSPACE_STEPS = 2  # in each iteration, towards the best approximation of rank three
@@ -79,8 +79,8 @@ class RGoDec:
 
     @property
     def deterministic(self) -> bool:
-        """A random start is not."""
-        return self.init != "random"
+        """A start that draws from the generator is not."""
+        return self.init not in SEEDED
 
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""

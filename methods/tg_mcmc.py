@@ -10,7 +10,7 @@ from bench.problem import Checkpoint, Estimate, Floats, Problem
 from bench.registry import method
 
 from . import _geodesic_kernels, spectral
-from ._starts import Start, start_rotations
+from ._starts import SEEDED, Start, start_rotations
 
 CHORDAL = 8.0  # squared Frobenius distance of two rotations over the sine squared of half their angle
 
@@ -91,7 +91,7 @@ class TGMCMC:
     @property
     def deterministic(self) -> bool:
         """Only without noise, and from a start that is."""
-        return 0 in (self.noise_deg, self.cooling) and self.init != "random"
+        return 0 in (self.noise_deg, self.cooling) and self.init not in SEEDED
 
     @property
     def exact_to_deg(self) -> float:

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench import so3
-from bench.problem import Estimate, Floats, Ints, Problem
+from bench.problem import Estimate, Ints, Problem
 from bench.registry import method
 
 from . import _camera_kernels, spectral
+from ._neighbours import neighbours_of
 from ._starts import Start, Started, start_rotations
 
 MET = 1e-9  # radians; a prediction this close to the camera counts as met
@@ -65,11 +66,12 @@ class Weiszfeld(Started):
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         cameras = so3.to_quaternion(start_rotations(self.init, problem, rng))
-        order, neighbours = _order(problem), _neighbours(problem)
+        order, seen = _order(problem), neighbours_of(problem)
+        measured = so3.to_quaternion(seen.rotations)
         turns = np.empty(problem.n)
         reason, done = "iteration limit", 0
         while done < self.sweeps:
-            _camera_kernels.median_sweep(order, *neighbours, MET, cameras, turns)
+            _camera_kernels.median_sweep(order, seen.first, seen.cameras, measured, MET, cameras, turns)
             done += 1
             if turns.mean() < np.radians(self.tolerance_deg):
                 reason = f"mean step below {self.tolerance_deg:g} degrees"
@@ -82,13 +84,3 @@ class Weiszfeld(Started):
 def _order(problem: Problem) -> Ints:
     angles = np.repeat(so3.angle(problem.rotations), 2)
     return np.lexsort((np.bincount(problem.edges.ravel(), angles), -problem.degree)).astype(np.int32)
-
-
-def _neighbours(problem: Problem) -> tuple[Ints, Ints, Floats]:
-    """Neighbours in compressed rows, with their measurements, as `median_sweep` takes them."""
-    i, j = problem.edges.T
-    forward = so3.to_quaternion(problem.rotations)
-    by_camera = np.argsort(np.concatenate([i, j]), kind="stable")
-    first = np.concatenate([[0], np.cumsum(problem.degree)]).astype(np.int32)
-    measured = np.concatenate([forward, forward * [1, -1, -1, -1]])[by_camera]
-    return first, np.concatenate([j, i])[by_camera], measured
