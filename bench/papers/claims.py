@@ -60,6 +60,8 @@ class Statement:
         What is compared of the errors.
     margin_deg
         Degrees by which the left side may be worse.
+    seeds
+        How many; 0 for as many as the table has.
     datasets
         Selections.
     left, right
@@ -75,6 +77,7 @@ class Statement:
     right: tuple[Side, ...]
     forms: tuple[str, ...]
     margin_deg: float = 0.0
+    seeds: int = 0
 
 
 @dataclass(frozen=True)
@@ -113,17 +116,18 @@ class Claims:
                 raise ValueError(f"unknown form '{form}'{suggestion(form, self.forms)}")
 
     def suites(self, name: str) -> tuple[Suite, ...]:
-        """What has to run: a suite for each dataset."""
-        methods: dict[str, dict[str, None]] = {}
+        """What has to run: a suite for each dataset and number of seeds."""
+        methods: dict[tuple[str, int], dict[str, None]] = {}
         for statement in self.statements:
             for form, left, right, dataset in _comparisons(statement):
                 for side in (left, right):
                     if not side.published:
-                        chosen = methods.setdefault(extended(dataset, side.dataset), {})
+                        place = extended(dataset, side.dataset), statement.seeds or self.seeds
+                        chosen = methods.setdefault(place, {})
                         chosen[self._method(form, side)] = None
         return tuple(
-            Suite(name, self.title, (dataset,), tuple(chosen), self.seeds, self.timeout_s, self.memory_gib)
-            for dataset, chosen in methods.items()
+            Suite(name, self.title, (dataset,), tuple(chosen), seeds, self.timeout_s, self.memory_gib)
+            for (dataset, seeds), chosen in methods.items()
         )
 
     def compare(self, published: list[dict[str, str]], computed: Computed) -> "pd.DataFrame":
