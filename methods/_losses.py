@@ -42,7 +42,7 @@ LOSSES: dict[str, Loss] = {
     "l2": Loss(lambda x: x**2 / 2, np.ones_like),
     "l1": Loss(lambda x: x, lambda x: 1 / np.maximum(x, SMALLEST_ANGLE)),
     "l-half": Loss(lambda x: 2 * np.sqrt(x), lambda x: np.maximum(x, SMALLEST_ANGLE) ** -1.5),
-    "geman-mcclure": Loss(lambda x: x**2 / (2 * (1 + x**2)), lambda x: (1 + x**2) ** -2.0, 1.0),
+    "geman-mcclure": Loss(lambda x: x**2 / (2 * (1 + x**2)), lambda x: 1 / (1 + x**2) ** 2, 1.0),
     "huber": Loss(lambda x: np.where(x < 1, x**2 / 2, x - 0.5), lambda x: 1 / np.maximum(x, 1), 1.345),
     "pseudo-huber": Loss(lambda x: np.sqrt(1 + x**2) - 1, lambda x: 1 / np.sqrt(1 + x**2), 1.345),
     "cauchy": Loss(lambda x: np.log1p(x**2) / 2, lambda x: 1 / (1 + x**2), 2.385),

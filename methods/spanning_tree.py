@@ -94,7 +94,11 @@ def _breadth_first_tree(problem: Problem) -> EdgeIds:
     candidates = np.flatnonzero(difference)
     i, j = problem.edges[candidates].T
     child, parent = np.where(difference[candidates] > 0, (j, i), (i, j))
-    order = np.lexsort((so3.angle(problem.rotations[candidates]), -problem.degree[parent], child))
+    highest = np.zeros(problem.n, dtype=problem.degree.dtype)
+    np.maximum.at(highest, child, problem.degree[parent])
+    kept = np.flatnonzero(problem.degree[parent] == highest[child])
+    candidates, child = candidates[kept], child[kept]
+    order = np.lexsort((so3.angle(problem.rotations[candidates]), child))
     _, first = np.unique(child[order], return_index=True)
     return candidates[order[first]]
 

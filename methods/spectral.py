@@ -64,6 +64,7 @@ def spectral_rotations(
     edge_weights: Floats | None = None,
     *,
     normalised: bool = True,
+    regularisation: float = 0.0,
     tolerance: float = PRECISE,
 ) -> tuple[Floats, Eigenspace]:
     """Rotations (n, 3, 3) by the steps of `Spectral`, the block of each edge multiplied by its weight.
@@ -82,6 +83,10 @@ def spectral_rotations(
         (m,) positive, by default ones. The diagonal blocks get the largest.
     normalised
         As in `Spectral`, D being the sum of the weights of a camera, its diagonal block included.
+    regularisation
+        How many times the mean of D is added to D. With outliers the leading eigenvectors tend to settle on a
+        few cameras of low degree at the rim of a large graph; this holds them in its middle (Chaudhuri, Chung
+        and Tsiatas 2012, for spectral clustering).
     tolerance
         Angle between the subspaces found and sought, in radians, at which the iteration ends.
     """
@@ -89,7 +94,8 @@ def spectral_rotations(
     diagonal = np.full(problem.n, weights.max())
     start = tree_rotations(problem, edge_weights)
     if normalised:
-        scale = 1 / np.sqrt(diagonal + np.bincount(problem.edges.ravel(), np.repeat(weights, 2)))
+        sums = diagonal + np.bincount(problem.edges.ravel(), np.repeat(weights, 2))
+        scale = 1 / np.sqrt(sums + regularisation * sums.mean())
         weights = weights * scale[problem.edges].prod(axis=1)
         diagonal = diagonal * scale**2
         start = start / scale[:, None, None]
@@ -112,7 +118,7 @@ def compile_and_load() -> None:
 def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, start: Floats, tolerance: float) -> Eigenspace:
     if problem.n <= SMALL:
         return dense_eigenspace(problem.block_matrix(weights, diagonal).toarray())
-    if _bandwidth(problem) < NARROW * problem.n:
+    if _is_narrow(problem):
         return leading_eigenspace(_inverse(problem, weights, diagonal, start), start, tolerance)
 
     def multiply(x: Floats) -> Floats:
@@ -124,13 +130,16 @@ def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, start: Floa
     return leading_eigenspace(multiply, start, tolerance)
 
 
-def _bandwidth(problem: Problem) -> int:
-    """Largest distance between the ends of an edge in the reverse Cuthill-McKee numbering."""
+def _is_narrow(problem: Problem) -> bool:
+    """Whether the bandwidth is small, at the reverse Cuthill-McKee numbering; it is at least half of every degree."""
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+    limit = NARROW * problem.n
+    if problem.degree.max() >= 2 * limit:
+        return False
     position = np.empty(problem.n, dtype=np.intp)
     position[reverse_cuthill_mckee(problem.adjacency(), symmetric_mode=True)] = np.arange(problem.n)
-    return int(np.abs(np.diff(position[problem.edges], axis=1)).max())
+    return bool(np.abs(np.diff(position[problem.edges], axis=1)).max() < limit)
 
 
 def _inverse(problem: Problem, weights: Floats, diagonal: Floats, start: Floats) -> Callable[[Floats], Floats]:
