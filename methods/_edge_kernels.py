@@ -74,8 +74,8 @@ def quaternions(matrices: Floats, result: Floats) -> None:
 def edge_residuals(edges: Ints, measured: Floats, cameras: Floats, vectors: Floats, angles: Floats) -> None:
     """Rotation vectors of R_i^T R_ij R_j, the residual of each edge seen in the world frame.
 
-    The angle is eight times the arctangent of an eighth of it, which two half-angle formulas give from sine
-    and cosine; no branch, no library call, accurate to the last digits from 0 to pi.
+    The angle is eight times the arctangent of the tangent of an eighth of it, which two half-angle formulas
+    give from the sine and cosine of its half; no branch, no library call, accurate to the last digits from 0 to pi.
 
     Parameters
     ----------
@@ -111,14 +111,13 @@ def edge_residuals(edges: Ints, measured: Floats, cameras: Floats, vectors: Floa
             v = w * c - x * d + y * a + z * b
             t = w * d + x * c - y * b + z * a
             sine = math.sqrt(u * u + v * v + t * t)
-            half = 1 / (1 + abs(cosine))
-            quarter = 1 / (1 + math.sqrt(1 + (sine * half) ** 2))
-            tangent = sine * half * quarter
-            square = tangent * tangent
+            above = 1 + abs(cosine)
+            inverse = 1 / (above + math.sqrt(above * above + sine * sine))
+            square = (sine * inverse) ** 2
             series = 0.0
             for coefficient in ARCTAN:
                 series = series * square + coefficient
-            scale = 8 * half * quarter * series
+            scale = 8 * inverse * series
             chunk[3, k] = scale * sine
             scale = math.copysign(scale, cosine)
             chunk[0, k], chunk[1, k], chunk[2, k] = scale * u, scale * v, scale * t

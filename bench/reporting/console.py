@@ -108,7 +108,8 @@ def _table(scene: Scene, entries: Iterable[Entry], width: int, timed: bool) -> T
         table.add_column(title, justify="right", no_wrap=True)
     if partial:
         table.add_column("seeds", justify="right", no_wrap=True)
-    table.add_column("solved/scored/all" if width >= WIDE and not several else "cameras", justify="right", no_wrap=True)
+    spelled = width >= WIDE and not several and not timed
+    table.add_column("solved/scored/all" if spelled else "cameras", justify="right", no_wrap=True)
     for entry in entries:
         cells = [_cell(entry, name, timed) for name, _ in columns]
         if partial:
