@@ -18,9 +18,8 @@ WIDE = 8  # width of the run that replaces the spectral start
 WIDE_LR = 0.1  # its step, relative to the main run's
 FIRST_SMOOTHING_DEG = 20.0
 LAST_SMOOTHING_DEG = {"l1": 0.03, "l2": 1.0, "l1/2": 0.3}
-FOUND = 0.1  # share of 3n that the leading singular values must have reached before their fall means anything
-FALL = 0.01  # of the leading singular values
-GROWTH = 10.0  # of sigma_4 / sigma_3
+FOUND = 0.1  # share of 3n that the three leading singular values must have reached before the misfit means anything
+PATIENCE = 0.15  # share of the iterations so far without a better misfit
 
 
 @method(
@@ -60,11 +59,11 @@ class DMFSynch:
     (3n)^(-1/2); the loss the mean absolute (l1) or squared (l2) misfit of the observed entries; full-batch
     SGD at 0.3 with momentum 0.9. A full-rank product first finds a robust answer of rank three and then
     slowly fits the outliers, so that everything hangs on when it is stopped. The published figures are
-    those of the iterate with the smallest error against ground truth. Here ``stop=rank`` sees nothing but
-    the product: it ends when sigma_4 / sigma_3 has grown tenfold over its minimum, or sigma_1 + sigma_2 +
-    sigma_3 has fallen by 1 % from its maximum, because outliers are fitted by further singular values, at
-    the expense of the first three, and keeps the checkpoint where that sum was largest. ``stop=limit``
-    keeps the last iterate.
+    those of the iterate with the smallest error against ground truth. Here ``stop=misfit`` sees nothing but
+    the measurements. The product can fit outliers, the n rotations read from it cannot: as long as it learns,
+    their misfit, the mean square root of the residual angles, falls; when outliers bend it, it rises. The rule
+    keeps the checkpoint with the smallest misfit, and ends when that one is older than 15 % of the iterations.
+    ``stop=limit`` keeps the last iterate.
 
     **paper** is the dense form by the paper's recipe to the end: depth 5, 100,000 iterations, the last iterate
     returned, checkpoints every 1,000 as in the authors' code. Which of them ground truth likes best (the pick
@@ -95,7 +94,7 @@ class DMFSynch:
     iterations
         How many; dense: at most. None: 500 for thin, 100,000 for dense.
     checkpoint_every
-        Iterations between two checkpoints. None: 100 for thin, 1,000 for paper, 250 for dense, where the rank is
+        Iterations between two checkpoints. None: 100 for thin, 1,000 for paper, 250 for dense, where the misfit is
         looked at as often.
     start
         Of thin: "spectral" (the default) or "random".
@@ -104,7 +103,7 @@ class DMFSynch:
     init_scale
         Of dense: size of the start, 1e-3 unless given.
     stop
-        Of dense: "rank" or "limit". None: "rank" for dense, "limit" for paper.
+        Of dense: "misfit" or "limit". None: "misfit" for dense, "limit" for paper.
     device
         Of dense: where torch computes, such as "cpu" (the default) or "cuda".
     """
@@ -120,7 +119,7 @@ class DMFSynch:
     start: Literal["spectral", "random", None] = None
     smoothing_deg: float | None = None
     init_scale: float | None = None
-    stop: Literal["rank", "limit", None] = None
+    stop: Literal["misfit", "limit", None] = None
     device: str | None = None
 
     def __post_init__(self) -> None:
@@ -251,21 +250,22 @@ class DMFSynch:
             device=self.device or "cpu",
         )
         paper = self.preset == "paper"
-        by_rank = (self.stop or ("limit" if paper else "rank")) == "rank"
+        by_misfit = (self.stop or ("limit" if paper else "misfit")) == "misfit"
         limit, every = self.iterations or 100_000, self.checkpoint_every or (1000 if paper else 250)
         checkpoints = list[Checkpoint]()
         for iteration in range(limit + 1):
             if iteration % every == 0 or iteration == limit:
                 cost, values, vectors = network.evaluate(loss)
-                diagnostics = {"cost": cost, **_singular_values(values)}
-                seconds = time.perf_counter() - clock
                 found = nearest_rotations(vectors[:, :3])
+                misfit = float(np.sqrt(problem.residuals(found)).mean())
+                diagnostics = {"cost": cost, "misfit": misfit, **_singular_values(values)}
+                seconds = time.perf_counter() - clock
                 checkpoints.append(Checkpoint(iteration, seconds, found, diagnostics))
-                if by_rank and outliers_are_being_fitted(checkpoints):
+                if by_misfit and outliers_are_being_fitted(checkpoints):
                     break
             if iteration < limit:
                 network.step(loss, self.lr or 0.3, self.momentum)
-        return _picked(checkpoints, by_rank)
+        return _picked(checkpoints, by_misfit)
 
 
 def spectral_start(problem: Problem) -> Floats:
@@ -282,29 +282,27 @@ def spectral_start(problem: Problem) -> Floats:
     return min(candidates, key=lambda rotations: float(problem.residuals(rotations).mean()))
 
 
-def leading_sum(checkpoint: Checkpoint) -> float:
+def outliers_are_being_fitted(checkpoints: list[Checkpoint]) -> bool:
+    """Whether three singular values have emerged, and the misfit has not improved for a while."""
+    last, best = checkpoints[-1], min(checkpoints, key=_misfit)
+    found = max(map(_leading_sum, checkpoints)) > FOUND * 3 * len(last.rotations)
+    return found and last.iteration - best.iteration > PATIENCE * last.iteration
+
+
+def _misfit(checkpoint: Checkpoint) -> float:
+    return checkpoint.diagnostics["misfit"]
+
+
+def _leading_sum(checkpoint: Checkpoint) -> float:
     """sigma_1 + sigma_2 + sigma_3 of the product; 3n if all of Z were fitted."""
     return sum(checkpoint.diagnostics[f"sigma_{k}"] for k in (1, 2, 3))
 
 
-def rank_ratio(checkpoint: Checkpoint) -> float:
-    """sigma_4 / sigma_3 of the product."""
-    return checkpoint.diagnostics["sigma_4"] / checkpoint.diagnostics["sigma_3"]
-
-
-def outliers_are_being_fitted(checkpoints: list[Checkpoint]) -> bool:
-    """Whether three singular values have emerged and since then have fallen, or the fourth has grown."""
-    largest, cameras = max(map(leading_sum, checkpoints)), len(checkpoints[-1].rotations)
-    fallen = leading_sum(checkpoints[-1]) < (1 - FALL) * largest
-    grown = rank_ratio(checkpoints[-1]) > GROWTH * min(map(rank_ratio, checkpoints))
-    return largest > FOUND * 3 * cameras and (fallen or grown)
-
-
-def _picked(checkpoints: list[Checkpoint], by_rank: bool) -> Estimate:
+def _picked(checkpoints: list[Checkpoint], by_misfit: bool) -> Estimate:
     last = checkpoints[-1]
-    best = max(checkpoints, key=leading_sum) if by_rank else last
-    fitted = by_rank and outliers_are_being_fitted(checkpoints)
-    kept = f"kept iteration {best.iteration}, where the three leading singular values were largest"
+    best = min(checkpoints, key=_misfit) if by_misfit else last
+    fitted = by_misfit and outliers_are_being_fitted(checkpoints)
+    kept = f"kept iteration {best.iteration}, whose rotations fit the measurements best"
     return Estimate(
         best.rotations,
         iterations=last.iteration,

@@ -42,7 +42,7 @@ Theirs = []
 
 [t.scenes]
 "Ellis Island" = "Ellis_Island"
-"Madrid" = "Madrid_Metropolis"
+"Madrid Metropolis" = "Madrid_Metropolis"
 "Alamo" = "Alamo"
 
 [f]
@@ -64,17 +64,89 @@ label = "clairvoyant"
 method = "spectral"
 dataset = { clairvoyant = true }
 reference = true
+
+[b]
+kind = "curves"
+title = "Bound"
+dataset = "erdos-renyi[noise=langevin,missing=0,outliers=0.2]"
+statistic = "rms_deg"
+alignment = "chordal"
+panel = { parameter = "n", label = "{} nodes", values = [40] }
+axis = { parameter = "noise_deg", label = "noise", values = [2, 4] }
+
+[[b.curves]]
+label = "least squares"
+method = "l1-irls[loss=l2]"
+dataset = { clairvoyant = true }
+
+[[b.curves]]
+label = "spectral"
+method = "spectral"
+
+[[b.curves]]
+label = "bound"
+
+[c]
+kind = "claims"
+title = "Claims"
+alignment = "l1"
+published = "t.csv"
+seeds = 6
+forms = { "plain" = "spectral[normalised=false]" }
+
+[[c.statements]]
+sentence = "beats a tree"
+statistic = "mean_deg"
+datasets = ["erdos-renyi[n=14,outliers=0.0]"]
+forms = ["plain"]
+left = [{}]
+right = [{ method = "spanning-tree" }]
+
+[[c.statements]]
+sentence = "outliers help"
+statistic = "mean_deg"
+datasets = ["erdos-renyi[n=14]"]
+forms = ["plain"]
+left = [{ dataset = { outliers = 0.4 } }]
+right = [{ dataset = { outliers = 0.0 } }]
+
+[[c.statements]]
+sentence = "as good as Theirs"
+statistic = "median_deg"
+margin_deg = 0.5
+datasets = ["1dsfm[protocol=truth-subgraph]"]
+forms = ["plain"]
+left = [{}]
+right = [{ published = "Theirs" }]
+
+[s]
+kind = "speedup"
+title = "Faster"
+dataset = "erdos-renyi[n=12]"
+method = "dmf-synch[iterations=20]"
+recipe = "dmf-synch[preset=paper,depth=2,iterations=20,checkpoint_every=10]"
+iterations = 1000
+curves = "curves.csv"
+chosen = { depth = 2 }
+alignment = "l1"
 """
 PUBLISHED = """scene,n_cameras,edges_percent,hardness,Ours,Theirs,source
 Ellis Island,9,50,0.1000,0.8,1.3,here
-Madrid,341,31,0.0029,2.3,1.7,here
+Madrid Metropolis,341,31,0.0029,2.3,1.7,here
 Alamo,577,50,0.0017,1.2,,here
+"""
+CURVES = """depth,iteration,mean_deg,median_deg
+2,0,90,80
+2,500,1.5,1.25
+2,1000,3.5,2.5
+3,500,1.0,0.5
 """
 
 
 @pytest.fixture
 def layout_file(tmp_path: Path) -> Path:
     (tmp_path / "t.csv").write_text(PUBLISHED)
+    (tmp_path / "curves.csv").write_text(CURVES)
     path = tmp_path / "a-paper.toml"
     path.write_text(LAYOUT)
     return path
@@ -176,9 +248,9 @@ def test_a_table_of_two_scenes_on_disk(layout_file: Path, tmp_path: Path) -> Non
     cells = {(r["scene"], r["quantity"], r["method"]): r for r in csv.DictReader(io.StringIO(done.stdout))}
     for method in ("spectral", "spanning-tree"):
         assert float(cells["Ellis Island", "Ours", method]["difference"]) == pytest.approx(-0.8, abs=0.01)
-        assert float(cells["Madrid", "Ours", method]["difference"]) == pytest.approx(-2.3, abs=0.01)
+        assert float(cells["Madrid Metropolis", "Ours", method]["difference"]) == pytest.approx(-2.3, abs=0.01)
     assert float(cells["Ellis Island", "n_cameras", ""]["measured"]) == 10
-    assert float(cells["Madrid", "edges_percent", ""]["difference"]) == pytest.approx(69)
+    assert float(cells["Madrid Metropolis", "edges_percent", ""]["difference"]) == pytest.approx(69)
     assert cells["Ellis Island", "Theirs", ""]["status"] == "published only"
     assert "4 jobs, 0 of them done already" in done.stderr
     assert "alamo is not on disk; get it with: python -m bench data fetch" in done.stderr.lower().replace("1dsfm/", "")
@@ -217,6 +289,63 @@ def test_a_figure_with_bands_over_two_seeds(layout_file: Path, tmp_path: Path) -
     assert set(records.loc[records["method"] == "spectral", "instance"].str.endswith("-clairvoyant")) == {True}
 
 
+def test_the_bound_is_drawn_where_least_squares_attains_it(layout_file: Path, tmp_path: Path) -> None:
+    done = bench("paper", layout_file, "b", "--seeds", 4, "--out", tmp_path / "run", "--format", "csv")
+    points = pd.read_csv(io.StringIO(done.stdout)).set_index(["noise_deg", "curve"])["rms_deg"].unstack()
+    assert (points["least squares"] / points["bound"]).to_numpy() == pytest.approx(1, abs=0.12)
+    assert (points["bound"] < points["spectral"]).all()
+    assert points["bound"].loc[4] / points["bound"].loc[2] == pytest.approx(2, rel=0.1)
+    records = pd.read_csv(io.StringIO(bench("table", tmp_path / "run", "--align", "chordal", "--format", "csv").stdout))
+    squares = records[records["method"] == "l1-irls"].groupby("instance")["rms_deg"].apply(lambda e: (e**2).mean())
+    assert np.sqrt(squares).tolist() == pytest.approx(points["least squares"].tolist())
+
+
+def test_sentences_are_judged_by_pairs_and_by_independent_samples(layout_file: Path, tmp_path: Path) -> None:
+    write_scene(tmp_path / "data" / "Ellis_Island", images=12)
+    write_scene(tmp_path / "data" / "Madrid_Metropolis", images=14)
+    command = ("paper", layout_file, "c", "--data-dir", tmp_path / "data", "--out", tmp_path / "run")
+    frame = pd.read_csv(io.StringIO(bench(*command, "--format", "csv").stdout))
+    honest = frame[frame["rule"] == "honest"].set_index("sentence")
+    assert honest["verdict"].to_dict() == {
+        "beats a tree": "holds",
+        "outliers help": "does not hold",
+        "as good as Theirs": "cannot tell",
+    }
+    assert honest["pairs"].tolist() == [6, 0, 2]
+    scenes = honest.loc["as good as Theirs"]  # two scenes, and three comparisons to correct for
+    assert 0.05 < scenes["p_holds"] < 0.15
+    assert scenes["right_deg"] == pytest.approx((1.3 + 1.7) / 2)
+    assert scenes["left_deg"] == pytest.approx(scenes["right_deg"] + scenes["difference_deg"])
+    without_checkpoints = frame.groupby("sentence")["left_deg"].nunique()
+    assert (without_checkpoints == 1).all()
+    shown = " ".join(bench(*command, "--format", "markdown").stdout.split())
+    assert "| **holds** |" in shown
+    assert "honest, plain: “outliers help”: 1 does not hold (of 1)." in shown
+
+
+def test_the_oracles_pick_is_another_iterate(layout_file: Path, tmp_path: Path) -> None:
+    """Of a dense product that is run to its end, the oracle's iterate is better."""
+    text = LAYOUT.replace("spectral[normalised=false]", "dmf-synch[preset=dense,depth=2,stop=limit,iterations=2500]")
+    layout_file.write_text(text.replace("seeds = 6", "seeds = 2"))
+    done = bench("paper", layout_file, "c", "--out", tmp_path / "run", "--data-dir", tmp_path, "--format", "csv")
+    frame = pd.read_csv(io.StringIO(done.stdout)).set_index(["sentence", "rule"])
+    assert frame.loc[("outliers help", "oracle"), "left_deg"] < frame.loc[("outliers help", "honest"), "left_deg"]
+    assert "1dsfm" in done.stderr
+
+
+def test_the_time_of_a_recipe_is_that_of_its_iterations(layout_file: Path, tmp_path: Path) -> None:
+    done = bench("paper", layout_file, "s", "--out", tmp_path / "run", "--format", "csv")
+    ours, recipe = pd.read_csv(io.StringIO(done.stdout)).itertuples()
+    assert recipe.total_s == pytest.approx(1000 * recipe.iteration_s)
+    assert ours.times_less == pytest.approx(recipe.total_s / ours.total_s)
+    assert (recipe.mean_deg, recipe.median_deg) == (1.5, 1.25)
+    assert "times less" in bench("paper", layout_file, "s", "--out", tmp_path / "run").stdout
+
+    (layout_file.parent / "curves.csv").write_text(CURVES.replace("2,", "4,"))
+    refused = bench("paper", layout_file, "s", "--out", tmp_path / "run", code=2)
+    assert "has no rows with depth=2" in refused.stderr
+
+
 def test_the_clairvoyant_graph_is_the_same_without_its_outliers() -> None:
     info = catalog("dataset")["erdos-renyi"]
     (plain,), (without,) = (
@@ -250,7 +379,7 @@ def test_what_differs_from_the_published_properties_is_bold() -> None:
 def test_papers_are_listed_with_their_items() -> None:
     listed = bench("list", "papers").stdout
     assert "dmf-synch-2023" in listed
-    assert all(f"{item}: " in listed for item in ("table1", "table2", "fig3"))
+    assert all(f"{item}: " in listed for item in ("table1", "table2", "fig3", "claims", "thin", "speedup"))
 
 
 @pytest.mark.parametrize(
@@ -275,6 +404,7 @@ def test_unknown_names_are_one_sentence(arguments: tuple[str, str], says: str) -
         ('kind = "scenes"', 'kind = "scene"', "kind must be one of"),
         ('statistic = "median_deg"\n', 'statistic = "median"\n', "statistic must be 'mean_deg' or 'median_deg'"),
         ('alignment = "l1"\nhigh', 'alignment = "l2"\nhigh', "did you mean 'l1'?"),
+        ('forms = ["plain"]', 'forms = ["plane"]', "did you mean 'plain'?"),
         ("values = [12, 16]", "value = [12, 16]", "unknown key 'value'; did you mean 'values'?"),
         ('title = "A paper"', "title = A paper", "is not valid TOML"),
     ],

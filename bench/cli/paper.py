@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bench.papers.computed import Computed
-    from bench.papers.layout import Item
+    from bench.papers.layout import Item, Layout
     from bench.reporting.grid import Grid
     from bench.runner import Options
 
@@ -38,10 +38,9 @@ def paper(
 
     The table goes to standard output, everything else to standard error.
     """
+    from bench.papers.curves import CurvePlot
     from bench.papers.layout import load_layout
     from bench.papers.properties import PropertyTable
-    from bench.papers.published import read_published
-    from bench.papers.scenes import SceneTable
     from bench.reporting import paper as tables
     from bench.runner import RUNS_FOLDER, Options
 
@@ -54,23 +53,41 @@ def paper(
     folder = out or RUNS_FOLDER / layout.name
     options = Options(out=folder, data_dir=data_dir, seeds=seeds, jobs=jobs)
     rule = align.value if align else chosen.alignment
-    published = read_published(layout.folder, chosen.published) if isinstance(chosen, SceneTable) else []
     computed = _computed(chosen, layout.name, options, rule)
-    if isinstance(chosen, SceneTable):
-        frame = chosen.compare(published, computed)
-        _print(tables.scene_grid(chosen, frame, computed, rule), frame, format)
-    else:
+    grid, frame = _compared(chosen, layout, computed, rule)
+    _print(grid, frame, format)
+    if isinstance(chosen, CurvePlot):
         from bench.reporting.bands import draw
 
-        points = chosen.points(computed)
-        notes = tables.point_notes(chosen, points, computed)
-        _print(tables.point_grid(chosen, points, rule, notes), points, format)
-        figure = draw(chosen, points, rule, notes)
-        _save(figure, points, folder / "plots", item)
+        _save(draw(chosen, frame, rule, grid.notes), frame, folder / "plots", item)
+
+
+def _compared(item: "Item", layout: "Layout", computed: "Computed", rule: str) -> "tuple[Grid, pd.DataFrame]":
+    """The table of an item, and the data frame behind it."""
+    from bench.papers.claims import Claims
+    from bench.papers.curves import CurvePlot
+    from bench.papers.published import read_published
+    from bench.papers.scenes import SceneTable
+    from bench.papers.speedup import Speedup
+    from bench.reporting import claims, paper
+
+    if isinstance(item, SceneTable):
+        frame = item.compare(read_published(layout.folder, item.published), computed)
+        return paper.scene_grid(item, frame, computed, rule), frame
+    if isinstance(item, Claims):
+        frame = item.compare(read_published(layout.folder, item.published), computed)
+        return claims.claims_grid(item, frame, computed, rule), frame
+    if isinstance(item, Speedup):
+        frame = item.compare(layout.reference, computed)
+        return claims.speedup_grid(item, frame, computed, rule), frame
+    assert isinstance(item, CurvePlot)
+    frame = item.points(computed)
+    return paper.point_grid(item, frame, rule, paper.point_notes(item, frame, computed)), frame
 
 
 def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Computed":
     """Run what is not done, then score the jobs of the item."""
+    from bench.papers.claims import Claims
     from bench.papers.computed import Computed
     from bench.results import score
     from bench.runner import NothingToRunError, Run
@@ -95,7 +112,8 @@ def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Comput
     store = runs[0].store
     jobs = [cell.job for planned in runs for cell in planned.cells]
     notes = {job.instance: store.instance(key).notes for key, job in {job.instance_key: job for job in jobs}.items()}
-    return Computed(jobs, score(store, rule, jobs=jobs), notes, tuple(missing))
+    scores = score(store, rule, jobs=jobs, oracle=isinstance(item, Claims))
+    return Computed(jobs, scores, notes, tuple(missing), lambda job: store.instance(job.instance_key))
 
 
 def _print(grid: "Grid", frame: "pd.DataFrame", format: Format) -> None:

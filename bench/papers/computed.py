@@ -1,11 +1,12 @@
 """What has been computed for an item of a paper."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from bench import registry, selection
 from bench.errors import InputError
+from bench.problem import Instance
 from bench.results import Results
 from bench.store import Job
 
@@ -24,12 +25,15 @@ class Computed:
         For each instance, what a reader must know of it.
     missing
         A sentence for what is not on disk.
+    instance
+        Reads the instance of a job.
     """
 
     jobs: Sequence[Job] = ()
     results: Results | None = None
     notes: Mapping[str, tuple[str, ...]] | None = None
     missing: tuple[str, ...] = ()
+    instance: Callable[[Job], Instance] | None = None
 
 
 def one(kind: str, text: str) -> tuple[str, dict[str, Any]]:

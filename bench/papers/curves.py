@@ -1,6 +1,6 @@
 """A figure of errors on simulated problems against one of their parameters, with panels for another."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -9,8 +9,12 @@ import numpy as np
 from bench import selection
 from bench.execution import outcome
 from bench.experiment import Suite
-from bench.papers.computed import Computed, extended, label
+from bench.papers.computed import Computed, extended, label, one
+from bench.problem import Floats
+from bench.registry import catalog
 from bench.scoring.statistics import seed_half_width
+from bench.scoring.theory import cramer_rao_rms_deg
+from bench.store import Job
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,10 +31,22 @@ class Axis:
 
 @dataclass(frozen=True)
 class Curve:
-    """A method, on the dataset with further parameters; a reference line is no contestant."""
+    """What one line shows.
+
+    Parameters
+    ----------
+    label
+        Its name.
+    method
+        A selection; "" for the Cramér-Rao bound of the problems, see `bench.scoring.theory`.
+    dataset
+        Added to the dataset's parameters.
+    reference
+        Whether it is a reference line, and no contestant.
+    """
 
     label: str
-    method: str
+    method: str = ""
     dataset: Mapping[str, Any] = field(default_factory=dict)
     reference: bool = False
 
@@ -60,7 +76,7 @@ class CurvePlot:
     panel: Axis
     axis: Axis
     curves: tuple[Curve, ...]
-    statistic: Literal["mean_deg", "median_deg"]
+    statistic: Literal["mean_deg", "median_deg", "rms_deg"]
     alignment: str
     seeds: int = 10
     timeout_s: float = 600.0
@@ -69,7 +85,7 @@ class CurvePlot:
     def suites(self, name: str) -> tuple[Suite, ...]:
         """What has to run: a suite for each variant of the dataset."""
         methods: dict[tuple[str, ...], list[str]] = {}
-        for curve in self.curves:
+        for curve in (curve for curve in self.curves if curve.method):
             datasets = tuple(text for _, _, text in self._problems(curve))
             methods.setdefault(datasets, []).append(curve.method)
         return tuple(
@@ -84,25 +100,32 @@ class CurvePlot:
         -------
         DataFrame
             The panel's and the axis' parameter, ``curve, method, dataset, seeds, ok`` (how many seeds there were and
-            how many ended well), the statistic's mean over these, ``half_width_deg`` of its 95 % t interval and
-            ``scored_percent`` of the cameras: fewer than all where a graph is not connected.
+            how many ended well), the statistic's mean over these (of ``rms_deg``: the root of the mean square),
+            ``half_width_deg`` of its 95 % t interval and ``scored_percent`` of the cameras: fewer than all where a
+            graph is not connected.
         """
         import pandas as pd
 
         assert computed.results is not None  # simulated data are never missing
         scores = computed.results.frame.set_index("job")
-        jobs: dict[tuple[str, str], list[str]] = {}
+        by_dataset: dict[str, list[Job]] = {}
         for job in computed.jobs:
-            method = selection.format_selection(job.method, dict(job.parameters))
-            jobs.setdefault((job.dataset, method), []).append(job.id)
+            by_dataset.setdefault(job.dataset, []).append(job)
         rows = []
         for curve in self.curves:
-            method = label("method", curve.method)
+            method = label("method", curve.method) if curve.method else ""
             for panel, x, text in self._problems(curve):
                 dataset = label("dataset", text)
-                found = scores.loc[jobs[dataset, method]]
-                well = found[found["status"] == outcome.OK]
-                values = well[self.statistic].to_numpy(dtype=float)
+                jobs = by_dataset[dataset]
+                if method:
+                    found = scores.loc[[job.id for job in jobs if _spelled(job) == method]]
+                    well = found[found["status"] == outcome.OK]
+                    errors = well[self.statistic].to_numpy(dtype=float)
+                    seeds, scored = len(found), 100 * well["n_scored"].sum() / max(1, well["n_cameras"].sum())
+                else:
+                    errors = _bounds(jobs, computed)
+                    seeds, scored = len(errors), 100.0
+                mean, half_width = _averaged(errors, self.statistic)
                 rows.append(
                     {
                         self.panel.parameter: panel,
@@ -110,11 +133,11 @@ class CurvePlot:
                         "curve": curve.label,
                         "method": method,
                         "dataset": dataset,
-                        "seeds": len(found),
-                        "ok": len(values),
-                        self.statistic: values.mean() if len(values) else np.nan,
-                        "half_width_deg": seed_half_width(values.tolist()),
-                        "scored_percent": 100 * well["n_scored"].sum() / max(1, well["n_cameras"].sum()),
+                        "seeds": seeds,
+                        "ok": len(errors),
+                        self.statistic: mean,
+                        "half_width_deg": half_width,
+                        "scored_percent": scored,
                     }
                 )
         return pd.DataFrame(rows)
@@ -125,3 +148,30 @@ class CurvePlot:
             for x in self.axis.values:
                 varied = {self.panel.parameter: panel, self.axis.parameter: x}
                 yield panel, x, extended(self.dataset, {**varied, **curve.dataset})
+
+
+def _spelled(job: Job) -> str:
+    return selection.format_selection(job.method, dict(job.parameters))
+
+
+def _bounds(jobs: Sequence[Job], computed: Computed) -> Floats:
+    """Cramér-Rao bounds on the RMS error of each instance, in degrees."""
+    assert computed.instance is not None
+    name, given = one("dataset", jobs[0].dataset)
+    noise, noise_deg = ({**catalog("dataset")[name].defaults(), **given}[key] for key in ("noise", "noise_deg"))
+    bounds = []
+    for job in {job.instance_key: job for job in jobs}.values():
+        instance = computed.instance(job)
+        assert instance.outliers is not None
+        bounds.append(cramer_rao_rms_deg(instance.problem, ~instance.outliers, noise, noise_deg))
+    return np.array(bounds)
+
+
+def _averaged(errors: Floats, statistic: str) -> tuple[float, float]:
+    """Average over seeds and the half-width of its interval; of root mean squares the squares are averaged."""
+    if not len(errors):
+        return np.nan, np.nan
+    if statistic != "rms_deg":
+        return float(errors.mean()), seed_half_width(errors.tolist())
+    rms = float(np.sqrt((errors**2).mean()))
+    return rms, seed_half_width((errors**2).tolist()) / (2 * rms) if rms > 0 else 0.0

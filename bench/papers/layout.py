@@ -12,15 +12,23 @@ from typing import Any
 
 from bench import named
 from bench.errors import InputError
+from bench.papers.claims import Claims
 from bench.papers.curves import CurvePlot
 from bench.papers.properties import PropertyTable
 from bench.papers.scenes import SceneTable
+from bench.papers.speedup import Speedup
 from bench.registry import suggestion
 from bench.scoring.alignment import RULES
 
-Item = SceneTable | PropertyTable | CurvePlot
+Item = SceneTable | PropertyTable | CurvePlot | Claims | Speedup
 PAPERS = "bench.papers"
-KINDS: dict[str, type[Item]] = {"scenes": SceneTable, "properties": PropertyTable, "curves": CurvePlot}
+KINDS: dict[str, type[Item]] = {
+    "scenes": SceneTable,
+    "properties": PropertyTable,
+    "curves": CurvePlot,
+    "claims": Claims,
+    "speedup": Speedup,
+}
 
 
 @dataclass(frozen=True)
@@ -33,8 +41,8 @@ class Layout:
         Its id, its title with authors and year, and its key in ``methods/references.bib``.
     items
         Tables and figures, by the names that the command line takes.
-    folder
-        Where its published numbers are.
+    folder, reference
+        Where its published numbers are, and our own recorded runs.
     """
 
     name: str
@@ -42,6 +50,7 @@ class Layout:
     cite: str
     items: Mapping[str, Item]
     folder: Traversable
+    reference: Traversable
 
     def item(self, name: str) -> Item:
         """One table or figure.
@@ -70,17 +79,18 @@ def load_layout(name: str) -> Layout:
         Where there is no such layout, or the file is not one.
     """
     stem, content = named.read("paper", PAPERS, name)
-    folder = Path(name).parent if name.endswith(".toml") else resources.files("bench.published")
-    return _parsed(stem, f"layout {name}", content, folder)
+    beside = Path(name).parent if name.endswith(".toml") else None
+    folder, reference = (beside or resources.files(package) for package in ("bench.published", "bench.reference"))
+    return _parsed(stem, f"layout {name}", content, folder, reference)
 
 
-def _parsed(name: str, where: str, content: dict[str, Any], folder: Traversable) -> Layout:
+def _parsed(name: str, where: str, content: dict[str, Any], folder: Traversable, reference: Traversable) -> Layout:
     head = {key: content.pop(key, "") for key in ("title", "cite")}
     for key, value in head.items():
         if not isinstance(value, str):
             raise InputError(f"{where}: '{key}' must be a str, not {value!r}")
     items = {key: _item(f"{where}: {key}", value) for key, value in content.items()}
-    return Layout(name, head["title"] or name, head["cite"], items, folder)
+    return Layout(name, head["title"] or name, head["cite"], items, folder, reference)
 
 
 def _item(where: str, content: Any) -> Item:
@@ -107,7 +117,11 @@ def _made(cls: Any, content: Any, where: str) -> Any:
     for key, f in fields.items():
         if key not in content and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING:
             raise InputError(f"{where}: key '{key}' is missing")
-    return cls(**{key: _value(hints[key], value, f"{where}.{key}") for key, value in content.items()})
+    values = {key: _value(hints[key], value, f"{where}.{key}") for key, value in content.items()}
+    try:
+        return cls(**values)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def _value(hint: Any, value: Any, where: str) -> Any:

@@ -1,0 +1,1 @@
+"""Our own runs that take long; README.md says what made each."""
