@@ -27,13 +27,14 @@ class TimingEngine:
     """Times cells: on each instance every method once, then all again, so that a drift of the machine hits all alike.
 
     A round is a supervised child that is pinned to one core, the last one that this process may use. The child
-    loads the problem, imports, compiles and warms up before the clock starts; where solving is fast it solves
-    several times, and the round counts for the median. Every second round goes through the methods backwards.
+    loads the problem, imports, compiles and warms up before the clock starts; where solving takes less than a few
+    seconds, one solution is part of the warm-up, and the round counts for the median of those that follow. Every
+    second round goes through the methods backwards.
 
-    What is stored of a job: as ``round_s`` the solve seconds of its rounds, their median as ``solve_s`` and the
-    smallest as ``min_s``, and as ``waited`` the largest share of a solution's time in which another process had
-    the core; all else, the estimate too, is that of the first round. A job whose round does not end
-    well ends so, and takes no part in the rounds that follow.
+    What is stored of a job: as ``round_s`` the solve seconds of its rounds, their median as ``solve_s``, the
+    smallest as ``min_s``, and as ``waited`` the largest share of a round's time in which another process had the
+    core; all else, the estimate too, is that of the first round. A job whose round does not end well ends so, and
+    takes no part in the rounds that follow.
 
     Parameters
     ----------
