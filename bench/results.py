@@ -11,6 +11,7 @@ from bench.execution import outcome
 from bench.problem import Floats, Instance
 from bench.scoring.errors import camera_errors, edge_metrics, summary
 from bench.scoring.oracle import ORACLE, Curve, curve
+from bench.scoring.roc import roc_auc
 from bench.scoring.statistics import tie_groups
 from bench.scoring.timing import speedup
 from bench.store import Job, Store
@@ -117,13 +118,15 @@ def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, 
 
     record = store.record(job.id) or {"outcome": outcome.NOT_RUN, "status": outcome.NOT_RUN}
     errors = np.full(instance.problem.n, np.nan)
-    scores: dict[str, Any] = {"n_solved": 0}
+    scores: dict[str, Any] = {"n_solved": 0, "roc_auc": np.nan}
     along = None
     if record["outcome"] == outcome.OK:
         estimate = store.estimate(job.id)
         rotations = estimate.rotations
         scores["n_solved"] = int(np.isfinite(rotations).all(axis=(1, 2)).sum())
         scores |= edge_metrics(instance.problem, rotations, instance.truth)
+        if estimate.edge_weights is not None and instance.outliers is not None:
+            scores["roc_auc"] = roc_auc(estimate.edge_weights, instance.outliers)
         if instance.truth is not None:
             errors = camera_errors(rotations, instance.truth, rule)
             along = curve(estimate, instance.truth, rule)
@@ -188,7 +191,10 @@ def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
     pick = along.oracle
     count = len(along.iterations)
     absent = dict.fromkeys(
-        ("peak_mib", "cost", "certificate", "min_s", *(k for k in row if k.startswith(("residual", "cost_"))))
+        (
+            *("peak_mib", "cost", "certificate", "roc_auc", "min_s"),
+            *(k for k in row if k.startswith(("residual", "cost_"))),
+        )
     )
     return {
         **row,

@@ -31,11 +31,14 @@ class Observed:
         (k,) the other camera of each block, k = 2m + n.
     blocks
         (9, k) the entries of the blocks.
+    order
+        (k,) which of the edges (0 to m - 1), the edges read backwards (m to 2m - 1) and the identities each block is.
     """
 
     first: NDArray[np.uint32]
     neighbour: NDArray[np.uint32]
     blocks: Single
+    order: NDArray[np.intp]
 
     @property
     def count(self) -> Floats:
@@ -52,7 +55,7 @@ class Observed:
         blocks = np.concatenate([problem.rotations, transposed, np.broadcast_to(np.eye(3), (n, 3, 3))])
         first = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
         flat = np.ascontiguousarray(blocks[order].reshape(-1, 9).T, dtype=np.float32)
-        return cls(first.astype(np.uint32), columns[order].astype(np.uint32), flat)
+        return cls(first.astype(np.uint32), columns[order].astype(np.uint32), flat, order)
 
 
 @dataclass
@@ -119,6 +122,7 @@ def descend(
     iterations: int,
     smoothing: tuple[float, float],
     report: Report | None = None,
+    weights: Single | None = None,
 ) -> float:
     """Gradient descent with momentum on the factors, in place; the step falls to zero along half a cosine.
 
@@ -134,6 +138,8 @@ def descend(
         First and last scale s of the smoothed losses "l1" and "l1/2", chordal; it falls geometrically.
     report
         Called with the iteration and the loss before every step, and once after the last.
+    weights
+        (k,) of the observed blocks in the loss, by default ones; `report` may change them in place.
 
     Returns
     -------
@@ -158,9 +164,8 @@ def descend(
         before, after = factors.partial_products()
         left = (factors.end @ before[-1]).reshape(n, -1) / root
         right = factors.end.reshape(n, -1) / root
-        cost = kernel(
-            observed.first, observed.neighbour, observed.blocks, left, right.T.copy(), np.float32(scale), sums
-        )
+        graph = observed.first, observed.neighbour, observed.blocks
+        cost = kernel(*graph, left, right.T.copy(), np.float32(scale), sums, weights)
         if not np.isfinite(cost):
             raise FloatingPointError(f"the product diverged after {t} iterations; a smaller lr may help")
         if report is not None:
@@ -183,8 +188,9 @@ def descend(
 def edge_kernel(width: int, loss: Loss) -> Callable[..., float]:
     """Compile the loop over observed blocks for one width and one loss; kept on disk by numba.
 
-    The function takes (first, neighbour, blocks, left (n, 3w), right (3w, n), s, sums (n, 3w)). It fills
-    ``sums`` with G @ right, where G is the gradient of the loss with respect to E, and returns the mean loss.
+    The function takes (first, neighbour, blocks, left (n, 3w), right (3w, n), s, sums (n, 3w), and the weights (k,)
+    of the blocks or nothing). It fills ``sums`` with G @ right, where G is the gradient of the loss with respect to
+    E, and returns the mean loss.
     With the residual r = left_i right_j^T - R_ij, the block of G is r / (r^2 + s^2)^(1/2) entry by entry for
     "l1", r for "l2", and s^(1/2) r / (|r|^2 + s^2)^(3/4) for "l1/2".
     """
@@ -193,7 +199,9 @@ def edge_kernel(width: int, loss: Loss) -> Callable[..., float]:
     size = 3 * width
 
     @numba.njit(cache=True, fastmath=True, nogil=True, error_model="numpy")
-    def kernel(first: Any, neighbour: Any, blocks: Any, left: Any, right: Any, scale: Any, sums: Any) -> float:
+    def kernel(
+        first: Any, neighbour: Any, blocks: Any, left: Any, right: Any, scale: Any, sums: Any, weights: Any = None
+    ) -> float:
         near = np.empty((size, CHUNK), np.float32)
         residual = np.empty((9, CHUNK), np.float32)
         square = np.empty(CHUNK, np.float32)
@@ -224,18 +232,21 @@ def edge_kernel(width: int, loss: Loss) -> Callable[..., float]:
                     else:
                         for k in range(length):
                             square[k] += residual[ab, k] * residual[ab, k]
-                part = np.float32(0)
                 if loss == "l1/2":
                     for k in range(length):
                         root = np.sqrt(np.sqrt(square[k] + scale * scale))
-                        part += root
-                        square[k] = np.sqrt(scale) / (root * root * root)
-                    for ab in range(9):
-                        for k in range(length):
-                            residual[ab, k] *= square[k]
-                else:
+                        factor = np.sqrt(scale) / (root * root * root)
+                        square[k] = root
+                        for ab in range(9):
+                            residual[ab, k] *= factor
+                if weights is not None:
                     for k in range(length):
-                        part += square[k]
+                        square[k] *= weights[begin + k]
+                        for ab in range(9):
+                            residual[ab, k] *= weights[begin + k]
+                part = np.float32(0)
+                for k in range(length):
+                    part += square[k]
                 total += part
                 for ab in range(9):
                     row, column = width * (ab // 3), width * (ab % 3)

@@ -36,7 +36,7 @@ ARCTAN = (
 )
 
 
-def _compiled(loop: Callable[P, None]) -> Callable[P, None]:
+def compiled(loop: Callable[P, None]) -> Callable[P, None]:
     @functools.cache
     def machine_code() -> Callable[P, None]:
         import numba
@@ -50,7 +50,7 @@ def _compiled(loop: Callable[P, None]) -> Callable[P, None]:
     return call
 
 
-@_compiled
+@compiled
 def quaternions(matrices: Floats, result: Floats) -> None:
     """Unit quaternions (m, 4), filled, of rotation matrices (m, 3, 3): the largest component by its square root."""
     for e in range(matrices.shape[0]):
@@ -70,7 +70,7 @@ def quaternions(matrices: Floats, result: Floats) -> None:
             result[e, k] = scale * q[k]
 
 
-@_compiled
+@compiled
 def edge_residuals(edges: Ints, measured: Floats, cameras: Floats, vectors: Floats, angles: Floats) -> None:
     """Rotation vectors of R_i^T R_ij R_j, the residual of each edge seen in the world frame.
 
@@ -127,7 +127,7 @@ def edge_residuals(edges: Ints, measured: Floats, cameras: Floats, vectors: Floa
             angles[first + k] = chunk[3, k]
 
 
-@_compiled
+@compiled
 def divergence(edges: Ints, weights: Floats, vectors: Floats, degrees: Floats, sums: Floats) -> None:
     """Sum what the edges of each camera carry.
 
@@ -152,7 +152,7 @@ def divergence(edges: Ints, weights: Floats, vectors: Floats, degrees: Floats, s
             sums[j, k] -= flow
 
 
-@_compiled
+@compiled
 def turn(steps: Floats, cameras: Floats) -> None:
     """Replace R_i by R_i exp(x_i), normalised: `cameras` (n, 4) in place, the x_i (n, 3) being `steps`."""
     for i in range(cameras.shape[0]):
@@ -172,7 +172,7 @@ def turn(steps: Floats, cameras: Floats) -> None:
             cameras[i, k] = q[k] / norm
 
 
-@_compiled
+@compiled
 def laplacian_product(edges: Ints, weights: Singles, degrees: Singles, x: Singles, product: Singles) -> None:
     """Multiply a weighted graph Laplacian with four columns, without forming it.
 
@@ -193,7 +193,7 @@ def laplacian_product(edges: Ints, weights: Singles, degrees: Singles, x: Single
             product[j, k] -= w * x[i, k]
 
 
-@_compiled
+@compiled
 def dense_laplacian(edges: Ints, weights: Floats, degrees: Floats, matrix: Floats) -> None:
     """Fill the upper triangle of a weighted graph Laplacian without its last row and column.
 
@@ -214,7 +214,7 @@ def dense_laplacian(edges: Ints, weights: Floats, degrees: Floats, matrix: Float
             matrix[i, j] = -weights[e]
 
 
-@_compiled
+@compiled
 def block_product(edges: Ints, matrices: Floats, weights: Floats, diagonal: Floats, x: Floats, product: Floats) -> None:
     """Multiply the symmetric block matrix of the measurements with three columns, without forming it.
 
@@ -245,3 +245,33 @@ def block_product(edges: Ints, matrices: Floats, weights: Floats, diagonal: Floa
             product[j, 0, k] += a * y + d * z + p * s
             product[j, 1, k] += b * y + f * z + q * s
             product[j, 2, k] += c * y + g * z + r * s
+
+
+@compiled
+def clipped_product(
+    edges: Ints, matrices: Floats, left: Floats, right: Floats, threshold: float, x: Floats, product: Floats
+) -> None:
+    """Multiply the symmetric block matrix of clipped residuals with three columns, without forming it.
+
+    Parameters
+    ----------
+    edges, matrices
+        (m, 2) and (m, 3, 3). Block (i, j) is R_ij - A_i B_j^T, each entry limited to [-threshold, threshold], block
+        (j, i) its transpose; block (i, i) likewise with the identity for R_ij.
+    left, right
+        (n, 3, 3): the A_i and the B_i, with A_i B_j^T = (A_j B_i^T)^T.
+    x, product
+        (n, 3, 3): the three columns, cut into one block for each camera; `product` is filled.
+    """
+    product[:] = 0
+    for e in range(-x.shape[0], edges.shape[0]):
+        i, j = (edges[e, 0], edges[e, 1]) if e >= 0 else (-1 - e, -1 - e)
+        for a in range(3):
+            for b in range(3):
+                measured = matrices[e, a, b] if e >= 0 else (1.0 if a == b else 0.0)
+                r = measured - left[i, a, 0] * right[j, b, 0] - left[i, a, 1] * right[j, b, 1]
+                r = min(max(r - left[i, a, 2] * right[j, b, 2], -threshold), threshold)
+                for k in range(3):
+                    product[i, a, k] += r * x[j, b, k]
+                    if e >= 0:
+                        product[j, b, k] += r * x[i, a, k]

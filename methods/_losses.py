@@ -1,18 +1,36 @@
 """Robust losses of an angle, each with the weight that iteratively reweighted least squares gives it.
 
-With x = angle / (tuning * sigma) every loss is scaled so that it is x^2 / 2 for small x, except the l1 and
-l1/2 losses, which have no scale. The weight is the derivative of the loss divided by the angle, times
+With x = angle / (tuning * sigma) every loss is scaled so that it is x^2 / 2 for small x, except the l1, l1.5
+and l1/2 losses, which have no scale. The weight is the derivative of the loss divided by the angle, times
 (tuning * sigma)^2.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from bench.problem import Floats
 
-SMALLEST_ANGLE = 5e-6  # radians; keeps the weights of l1 and l1/2 finite, at most about 1e8 as published
+LossName = Literal[
+    "geman-mcclure",
+    "l-half",
+    "l1",
+    "l1.5",
+    "l2",
+    "huber",
+    "pseudo-huber",
+    "cauchy",
+    "welsch",
+    "andrews",
+    "bisquare",
+    "fair",
+    "talwar",
+    "magsac",
+]
+
+SMALLEST_ANGLE = 5e-6  # radians; keeps the weights of l1, l1.5 and l1/2 finite, at most about 1e8 as published
 
 
 @dataclass(frozen=True)
@@ -38,9 +56,34 @@ class Loss:
         return 1.0 if self.tuning is None else self.tuning * sigma
 
 
+MAGSAC_CUT = 3.3682  # of sigma: the 99 % quantile of the length of a standard normal vector in three dimensions
+_MAGSAC_TAIL = np.exp(-(MAGSAC_CUT**2) / 2)
+
+
+def magsac_value(x: Floats) -> Floats:
+    """Loss with the weight `magsac_weight`; constant from the cut on."""
+    square = np.minimum(x**2, MAGSAC_CUT**2 / 2)
+    return (-np.expm1(-square) - _MAGSAC_TAIL * square) / (2 * (1 - _MAGSAC_TAIL))
+
+
+def magsac_weight(x: Floats) -> Floats:
+    """Likelihood of a residual, averaged over the noise levels up to sigma; x is residual / (sqrt(2) sigma).
+
+    MAGSAC++ (Barath et al., CVPR 2020) takes the residual for the length of a normal vector, cut at its 99 %
+    quantile k, whose standard deviation is uniform on [0, sigma]. With the three degrees of freedom of a
+    rotation its incomplete gamma functions are exponentials: the weight is
+    exp(-r^2 / (2 sigma^2)) - exp(-k^2 / 2) up to r = k sigma and 0 from there on, scaled here to 1 at r = 0.
+    Zhang, Larsson and Barath, CVPR 2023, average rotations with it. There the residuals are divided by the
+    covariances of the two-view geometries, which need the point matches; here sigma is the same for all
+    edges.
+    """
+    return np.maximum(np.exp(-(x**2)) - _MAGSAC_TAIL, 0) / (1 - _MAGSAC_TAIL)
+
+
 LOSSES: dict[str, Loss] = {
     "l2": Loss(lambda x: x**2 / 2, np.ones_like),
     "l1": Loss(lambda x: x, lambda x: 1 / np.maximum(x, SMALLEST_ANGLE)),
+    "l1.5": Loss(lambda x: x**1.5 / 1.5, lambda x: np.maximum(x, SMALLEST_ANGLE) ** -0.5),
     "l-half": Loss(lambda x: 2 * np.sqrt(x), lambda x: np.maximum(x, SMALLEST_ANGLE) ** -1.5),
     "geman-mcclure": Loss(lambda x: x**2 / (2 * (1 + x**2)), lambda x: 1 / (1 + x**2) ** 2, 1.0),
     "huber": Loss(lambda x: np.where(x < 1, x**2 / 2, x - 0.5), lambda x: 1 / np.maximum(x, 1), 1.345),
@@ -51,4 +94,5 @@ LOSSES: dict[str, Loss] = {
     "bisquare": Loss(lambda x: (1 - np.maximum(1 - x**2, 0) ** 3) / 6, lambda x: np.maximum(1 - x**2, 0) ** 2, 4.685),
     "fair": Loss(lambda x: x - np.log1p(x), lambda x: 1 / (1 + x), 1.4),
     "talwar": Loss(lambda x: np.minimum(x, 1) ** 2 / 2, lambda x: (x < 1).astype(float), 2.795),
+    "magsac": Loss(magsac_value, magsac_weight, float(np.sqrt(2))),
 }

@@ -1,7 +1,6 @@
 """L1-IRLS: robust rotation averaging in the tangent space."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -11,33 +10,18 @@ from bench.registry import method
 
 from . import _edge_kernels, _laplacian, spectral
 from ._laplacian import LaplacianSolver
-from ._losses import LOSSES, Loss
-from ._starts import Start, start_rotations
+from ._losses import LOSSES, Loss, LossName
+from ._starts import Start, Started, start_rotations
 
 SMALLEST_WEIGHT = 1e-10  # relative to the largest
 SLOW = 0.5  # mean step, relative to the one before, above which a stage creeps
 RELAXATION = 1.5  # factor of the steps of a stage that creeps
 LINEAR_TOLERANCE = 0.03  # of the least squares problems of large graphs; the next iteration corrects the rest
 
-LossName = Literal[
-    "geman-mcclure",
-    "l-half",
-    "l1",
-    "l2",
-    "huber",
-    "pseudo-huber",
-    "cauchy",
-    "welsch",
-    "andrews",
-    "bisquare",
-    "fair",
-    "talwar",
-]
-
 
 @method("l1-irls", title="L1-IRLS", cite="chatterjee2018", requires=("scipy", "numba"), robust=True)
 @dataclass(frozen=True)
-class L1IRLS:
+class L1IRLS(Started):
     """Minimises sum_ij loss(angle(R_i^T R_ij R_j)) by a sequence of weighted least squares problems.
 
     With R_i <- R_i exp(x_i) an edge asks for x_i - x_j = b_ij, where exp(b_ij) = R_i^T R_ij R_j. Each
@@ -65,8 +49,8 @@ class L1IRLS:
     Parameters
     ----------
     sigma_deg
-        Scale of the noise; each loss multiplies it by its own tuning constant. l1, l2 and l-half have no
-        scale.
+        Scale of the noise; each loss multiplies it by its own tuning constant. l1, l1.5, l2 and
+        l-half have no scale.
     loss
         Loss of the second stage.
     init
@@ -92,11 +76,6 @@ class L1IRLS:
         for name in ("l1_iterations", "irls_iterations"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
-
-    @property
-    def deterministic(self) -> bool:
-        """A random start is not."""
-        return self.init != "random"
 
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""

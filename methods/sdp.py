@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from bench import so3
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
 from ._certificate import chordal_cost, multipliers, smallest_eigenvalue
+from ._rounding import rounded
 from .spectral import compile_and_load, spectral_rotations
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class SDP:
             _solve_by_clarabel(relaxation, self.eps, self.max_iterations)
         if relaxation.status not in USABLE:
             raise RuntimeError(f"{self.solver} ended without a solution; its status is '{relaxation.status}'")
-        rotations = _rounded(relaxation.constraints[0].dual_value)
+        rotations = rounded(relaxation.constraints[0].dual_value)
         iterations = relaxation.solver_stats.num_iters
         notes: tuple[str, ...] = ()
         if relaxation.status != "optimal":
@@ -139,7 +139,7 @@ def _solve_from_spectral(relaxation: "cvxpy.Problem", problem: Problem, eps: flo
     )
     rotations = spectral_rotations(problem)[0]
     row, col = np.tril_indices(3)
-    triangles = (multipliers(problem, rotations) / problem.degree.mean())[:, row, col].ravel()
+    triangles = (multipliers(problem.block_matrix(), rotations) / problem.degree.mean())[:, row, col].ravel()
     stacked = rotations.reshape(-1, 3)
     solution = solver.solve(
         warm_start=True,
@@ -165,12 +165,3 @@ def _packed(symmetric: Floats) -> Floats:
     """Lower triangle, column by column, off-diagonal entries times sqrt(2): SCS's symmetric matrix."""
     row, col = np.triu_indices(len(symmetric))
     return symmetric[row, col] * np.where(row == col, 1.0, np.sqrt(2))
-
-
-def _rounded(gram: Floats) -> Floats:
-    """Rotations (n, 3, 3) nearest to the three leading eigenvectors of a matrix (3n, 3n) close to R R^T."""
-    values, vectors = np.linalg.eigh(gram)
-    blocks = (vectors[:, -3:] * np.sqrt(values[-3:])).reshape(-1, 3, 3)
-    if np.sign(np.linalg.det(blocks)).sum() < 0:
-        blocks = blocks * [1.0, 1.0, -1.0]
-    return so3.project(blocks)

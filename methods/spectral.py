@@ -81,7 +81,8 @@ def spectral_rotations(
     problem
         A connected problem.
     edge_weights
-        (m,) positive, by default ones. The diagonal blocks get the largest.
+        (m,) positive, by default ones. The diagonal block of each camera gets their mean over its edges when
+        `normalised` (a larger one would cut off a camera whose edges all weigh little), else the largest of all.
     normalised
         As in `Spectral`, D being the sum of the weights of a camera, its diagonal block included.
     regularisation
@@ -95,8 +96,9 @@ def spectral_rotations(
     diagonal = np.full(problem.n, weights.max())
     scale = np.ones(problem.n)
     if normalised:
-        sums = diagonal + np.bincount(problem.edges.ravel(), np.repeat(weights, 2))
-        scale = 1 / np.sqrt(sums + regularisation * sums.mean())
+        sums = np.bincount(problem.edges.ravel(), np.repeat(weights, 2))
+        diagonal = sums / problem.degree
+        scale = 1 / np.sqrt(diagonal + sums + regularisation * (diagonal + sums).mean())
         weights = weights * scale[problem.edges].prod(axis=1)
         diagonal = diagonal * scale**2
     found = _eigenspace(problem, weights, diagonal, scale, tolerance)
@@ -118,7 +120,8 @@ def compile_and_load() -> None:
 def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, scale: Floats, tolerance: float) -> Eigenspace:
     if problem.n <= SMALL:
         return dense_eigenspace(problem.block_matrix(weights, diagonal).toarray())
-    if _is_narrow(problem):
+    highest = problem.degree.max()  # the bandwidth is at least half of it
+    if highest < 2 * NARROW * problem.n and bandwidth(problem) < NARROW * problem.n:
         start = (tree_rotations(problem) / scale[:, None, None]).reshape(-1, 3)
         return leading_eigenspace(_inverse(problem, weights, diagonal, start), start, tolerance)
 
@@ -144,16 +147,13 @@ def _neighbourhood(problem: Problem) -> Floats:
     return rotations
 
 
-def _is_narrow(problem: Problem) -> bool:
-    """Whether the bandwidth is small, at the reverse Cuthill-McKee numbering; it is at least half of every degree."""
+def bandwidth(problem: Problem) -> int:
+    """Largest distance between the ends of an edge in the reverse Cuthill-McKee numbering."""
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-    limit = NARROW * problem.n
-    if problem.degree.max() >= 2 * limit:
-        return False
     position = np.empty(problem.n, dtype=np.intp)
     position[reverse_cuthill_mckee(problem.adjacency(), symmetric_mode=True)] = np.arange(problem.n)
-    return bool(np.abs(np.diff(position[problem.edges], axis=1)).max() < limit)
+    return int(np.abs(np.diff(position[problem.edges], axis=1)).max())
 
 
 def _inverse(problem: Problem, weights: Floats, diagonal: Floats, start: Floats) -> Callable[[Floats], Floats]:

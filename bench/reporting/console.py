@@ -12,11 +12,13 @@ from rich.text import Text
 
 from bench.reporting.grid import Grid
 from bench.reporting.rows import (
+    ROC_LEGEND,
     TIE_LEGEND,
     Entry,
     Scene,
     Ties,
     Value,
+    area,
     degrees,
     exact_seconds,
     is_timed,
@@ -101,6 +103,8 @@ def _table(scene: Scene, entries: Iterable[Entry], width: int, timed: bool) -> T
     else:
         if scene.has_truth and width >= WIDE and not several:
             columns += [("p90_deg", "p90 °"), ("within_5_deg", "<5°")]
+        if scene.has_roc:
+            columns.append(("roc_auc", "AUC"))
         columns += [("solve_s", "time s"), ("peak_mib", "MiB")]
     table = _empty_table()
     table.add_column("  method", overflow="fold", min_width=16)
@@ -141,6 +145,8 @@ def _cell(entry: Entry, name: str, timed: bool) -> str:
         return f"{100 * value.mean:.0f} %" if value.known else "–"
     if name == "solve_s":
         return seconds(value.mean)
+    if name == "roc_auc":
+        return area(value.mean)
     if name == "peak_mib":
         return f"{value.mean:.0f}" if value.known else "–"
     spread = f" ±{degrees(value.half_width)}" if math.isfinite(value.half_width) else ""
@@ -165,6 +171,8 @@ def _legend(frame: pd.DataFrame) -> list[str]:
     ]
     if frame["seed"].nunique() > 1:
         lines.append("means over the seeds that ended well, ± half-width of the 95 % t interval over seeds")
+    if "roc_auc" in frame and frame["roc_auc"].notna().any():
+        lines.append(f"AUC: {ROC_LEGEND}")
     return lines
 
 

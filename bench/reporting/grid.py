@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import pandas as pd
 
-from bench.reporting.rows import TIE_LEGEND, Configured, Entry, Scene, Ties, degrees, scenes
+from bench.reporting.rows import ROC_LEGEND, TIE_LEGEND, Configured, Entry, Scene, Ties, area, degrees, scenes
 
 ABBREVIATIONS = {
     "timeout": "TO",
@@ -26,6 +26,7 @@ ABBREVIATIONS = {
 UNKNOWN = "n/t"
 PARTIAL = "†"
 ABSENT = "–"
+ROC = "ROC AUC"
 LATEX_COLUMNS = 9  # methods that fit the width of a page
 
 _TEX = {
@@ -195,6 +196,9 @@ def _grid(group: Sequence[Scene]) -> Grid:
         by_method = {(e.method, e.params): e for e in scene.entries}
         cells = tuple(_cell(scene, by_method.get(method)) for method in methods)
         rows.append((tuple(fact(scene) for _, fact in shown), cells))
+        if scene.has_roc:
+            areas = (by_method[m].roc_auc.mean if m in by_method else math.nan for m in methods)
+            rows.append((("", *[""] * (len(shown) - 2), ROC), tuple(Cell(area(value)) for value in areas)))
     return Grid(
         caption=f"{first.dataset}: mean / median error in degrees, {first.alignment} alignment, "
         f"protocol {first.protocol}",
@@ -246,9 +250,11 @@ def _notes(group: Sequence[Scene], cells: Sequence[str]) -> list[str]:
         PARTIAL: "fewer cameras scored than by another method",
         "(": "(k/s) only k of s seeds ended well",
         UNKNOWN: "solved, but no camera has ground truth",
-        ABSENT: "not in this run",
+        ABSENT: "not in this run, or no edge weights" if any(s.has_roc for s in group) else "not in this run",
     }
     marks = [meaning if mark == "(" else f"{mark}: {meaning}" for mark, meaning in legend.items() if mark in text]
+    if any(scene.has_roc for scene in group):
+        marks.append(f"{ROC}: {ROC_LEGEND}")
     used = set(re.split(r"[ /]", text))
     marks += [f"{short}: {name}" for name, short in ABBREVIATIONS.items() if short in used]
     if any(e.seeds > 1 for scene in group for e in scene.entries):

@@ -74,6 +74,11 @@ class Entry:
         return f"{self.method}[{self.params}]" if self.params else self.method
 
     @property
+    def roc_auc(self) -> Value:
+        """Area under the ROC curve of the edge weights."""
+        return self.values.get("roc_auc", Value(math.nan))
+
+    @property
     def failure(self) -> str:
         """Every status other than ok, with how many seeds it took where there are several."""
         if self.seeds == 1:
@@ -99,6 +104,11 @@ class Scene:
         """Whether any entry was scored; True where nothing ended well, because that is not known then."""
         return any(e.scored for e in self.entries) or not any(e.ok for e in self.entries)
 
+    @property
+    def has_roc(self) -> bool:
+        """Whether the edge weights of any entry could be held against the true outliers."""
+        return any(e.roc_auc.known for e in self.entries)
+
 
 _VALUES = (
     "mean_deg",
@@ -113,7 +123,9 @@ _VALUES = (
     "speedup",
     "speedup_low",
     "speedup_high",
+    "roc_auc",
 )
+ROC_LEGEND = "area under the ROC curve of a method's edge weights against the true outliers; 1 tells all of them apart"
 
 
 def scenes(frame: pd.DataFrame, ties: Ties) -> list[Scene]:
@@ -228,6 +240,13 @@ def exact_seconds(value: float) -> str:
     if not math.isfinite(value):
         return "–"
     return f"{value:.{max(2 - math.floor(math.log10(value)), 0)}f}" if value > 0 else "0"
+
+
+def area(value: float) -> str:
+    """An area under a curve as a table prints it; what is below 1 never shows as 1."""
+    if not math.isfinite(value):
+        return "–"
+    return "1" if value == 1 else f"{min(value, 0.9999):.4f}"
 
 
 def seconds(value: float) -> str:

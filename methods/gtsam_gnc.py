@@ -1,0 +1,120 @@
+"""Graduated non-convexity, as GTSAM implements it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bench.problem import Estimate, Problem
+from bench.registry import method
+
+from . import spectral
+from ._gtsam import rotations_of, values_of
+from ._starts import Start, Started, start_rotations
+from ._stopwatch import Stopwatch
+from .gnc import SURROGATES, GncLoss
+
+PRIOR_SIGMA = 1.0  # any; a prior on one camera fixes the gauge and costs nothing
+INLIER_COST = 0.5  # GTSAM's cost of a residual at the threshold
+
+
+@method("gtsam-gnc", title="GNC (GTSAM)", cite="yang2020", requires=("gtsam", "scipy", "numba"), robust=True)
+@dataclass(frozen=True)
+class GtsamGNC(Started):
+    """Minimises the costs of `gnc`, each weighted problem by Levenberg-Marquardt.
+
+    1. Start from `init`; a prior on the first camera, known to be an inlier, fixes the gauge.
+    2. Solve with all weights 1 and choose mu from the largest residual.
+    3. For each mu: weights from the residuals, then Levenberg-Marquardt from the start of 1 (not from the
+       last solution).
+    4. Stop when mu has reached 1 (Geman-McClure), the weights are all 0 or 1 (truncated least squares), or
+       the cost changes by less than 1e-5 of it.
+
+    Source: Yang, Antonante, Tzoumas and Carlone, RA-L 2020; GTSAM's GncOptimizer with its defaults.
+    Deviations: `init`; the inner optimization ends by the relative decrease of its cost alone, because
+    GTSAM's absolute limit stops small problems early. Nothing keeps a camera whose edges are all rejected
+    from staying where it started. The weights of a problem are used by the spanning-tree start alone.
+
+    GTSAM's keys are camera-to-world rotations S_i = R_i^T with measurements S_i^T S_j, which is R_ij as it
+    stands; its residual is the rotation vector, in units of the threshold here.
+
+    Parameters
+    ----------
+    loss, threshold_deg
+        As in `gnc`.
+    init
+        Where to start, see `start_rotations`.
+    tolerance
+        Relative decrease of the cost at which an inner optimization ends; the default is GTSAM's.
+    """
+
+    loss: GncLoss = "tls"
+    threshold_deg: float = 5.0
+    init: Start = "spectral"
+    tolerance: float = 1e-5
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        for name in ("threshold_deg", "tolerance"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} must be positive, not {getattr(self, name):g}")
+
+    @property
+    def invariant_to_deg(self) -> float | None:
+        """GTSAM ends as soon as its cost changes little, which with Geman-McClure is early."""
+        if self.init == "random":
+            return None
+        return 0.1 if self.loss == "geman-mcclure" else 1e-3
+
+    def warm_up(self) -> None:
+        """Compile what the start uses and load GTSAM."""
+        spectral.compile_and_load()
+        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
+        self.solve(two_cameras, np.random.default_rng())
+
+    def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
+        import gtsam
+
+        threshold = np.radians(self.threshold_deg)
+        found = start_rotations(self.init, problem, rng)
+        conversion = Stopwatch()
+        with conversion.running():
+            start, graph = values_of(found), _graph(problem, threshold)
+        optimizer = gtsam.GncLMOptimizer(graph, start, self._parameters(prior=problem.m))
+        optimizer.setInlierCostThresholds(INLIER_COST)
+        values = optimizer.optimize()
+        with conversion.running():
+            rotations = rotations_of(values, problem.n)
+            weights = np.array(optimizer.getWeights())[: problem.m]
+        cost = SURROGATES[self.loss].cost((problem.residuals(rotations) / threshold) ** 2).sum()
+        return Estimate(
+            rotations,
+            edge_weights=weights,
+            stop_reason="GTSAM does not tell",
+            cost=float(cost),
+            conversion_s=conversion.seconds,
+        )
+
+    def _parameters(self, prior: int) -> Any:
+        import gtsam
+
+        descent = gtsam.LevenbergMarquardtParams()
+        descent.setRelativeErrorTol(self.tolerance)
+        descent.setAbsoluteErrorTol(0.0)
+        parameters = gtsam.GncLMParams(descent)
+        parameters.setLossType(gtsam.GncLossType.TLS if self.loss == "tls" else gtsam.GncLossType.GM)
+        parameters.setKnownInliers([prior])
+        return parameters
+
+
+def _graph(problem: Problem, threshold: float) -> Any:
+    """GTSAM's factor graph, the prior last; residuals in units of the threshold."""
+    import gtsam
+
+    graph = gtsam.NonlinearFactorGraph()
+    noise = gtsam.noiseModel.Isotropic.Sigma(3, threshold)
+    for (i, j), rotation in zip(problem.edges.tolist(), problem.rotations, strict=True):
+        graph.add(gtsam.BetweenFactorRot3(i, j, gtsam.Rot3(rotation), noise))
+    gauge = gtsam.noiseModel.Isotropic.Sigma(3, PRIOR_SIGMA)
+    graph.add(gtsam.PriorFactorRot3(0, gtsam.Rot3(), gauge))
+    return graph
