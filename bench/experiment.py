@@ -27,7 +27,10 @@ class Suite:
     seeds
         How many seeds, 0 to seeds - 1.
     timeout_s, memory_gib
-        Limits of one job.
+        Limits of one job; in a timing run, of one round of it.
+    rounds, baseline
+        Of timing runs: how often each job is timed, and the method that the others are compared with, by
+        default the first.
     """
 
     name: str
@@ -37,6 +40,8 @@ class Suite:
     seeds: int = 1
     timeout_s: float = 600.0
     memory_gib: float = 8.0
+    rounds: int = 5
+    baseline: str = ""
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,8 @@ _FIELDS: dict[str, tuple[type, ...]] = {
     "seeds": (int,),
     "timeout_s": (int, float),
     "memory_gib": (int, float),
+    "rounds": (int,),
+    "baseline": (str,),
 }
 
 
@@ -94,6 +101,9 @@ def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
         if not content.get(key) or not all(isinstance(text, str) for text in content[key]):
             raise InputError(f"{where}: '{key}' must be a list of selections, such as {key} = ['name[parameter=1]']")
         content[key] = tuple(content[key])
+    if "baseline" in content and content["baseline"] not in content["methods"]:
+        guess = registry.suggestion(content["baseline"], content["methods"])
+        raise InputError(f"{where}: the baseline '{content['baseline']}' is not one of its methods{guess}")
     return Suite(name, content.pop("title", name), **content)
 
 
@@ -114,8 +124,9 @@ def resolve(
     *,
     data_dir: Path | None = None,
     protocol: str | None = None,
+    timing: bool = False,
 ) -> Experiment:
-    """Expand a suite into cells, instance by instance.
+    """Expand a suite into cells, instance by instance; the jobs of a timing run are not those of an ordinary one.
 
     Raises
     ------
@@ -125,6 +136,7 @@ def resolve(
     chosen = methods.select(suite.methods)
     missing: dict[tuple[str, str], list[str]] = {}
     cells: list[Cell] = []
+    rounds = suite.rounds if timing else 0
     for info, parameters in datasets.select(suite.datasets):
         if protocol is not None and "protocol" in info.defaults():
             parameters = parameters | {"protocol": protocol}
@@ -136,7 +148,7 @@ def resolve(
                     names = missing.setdefault((info.name, source.command), [])
                     names += [source.name] if source.name not in names else []
                 elif source.seeded or seed == 0:
-                    cells += _cells_of(source, info, configured, label, seed, suite.seeds, chosen)
+                    cells += _cells_of(source, info, configured, label, seed, suite.seeds, chosen, rounds)
     sentences = (_absence(dataset, names, command) for (dataset, command), names in missing.items())
     return Experiment(suite, tuple(cells), tuple(sentences))
 
@@ -155,6 +167,7 @@ def _cells_of(
     seed: int,
     seeds: int,
     methods: Iterable[tuple[Info, dict[str, Any]]],
+    rounds: int,
 ) -> list[Cell]:
     """Cells of one instance. On data that no seed changes, a deterministic method needs one seed only."""
     key = digest([dataset.name, parameters_of(configured), source.name, source.revision])
@@ -164,7 +177,19 @@ def _cells_of(
         repeated = not source.seeded and not info.fact("deterministic", configured_method)
         complete = parameters_of(configured_method)
         for method_seed in range(seeds) if repeated else (seed,):
-            identity = digest([SCHEMA, key, info.name, complete, info.source_hash, method_seed])
-            job = Job(identity, label, source.name, key, info.name, info.title, info.origin, parameters, method_seed)
+            timed = [rounds] if rounds else []
+            identity = digest([SCHEMA, key, info.name, complete, info.source_hash, method_seed, *timed])
+            job = Job(
+                identity,
+                label,
+                source.name,
+                key,
+                info.name,
+                info.title,
+                info.origin,
+                parameters,
+                method_seed,
+                rounds,
+            )
             cells.append(Cell(job, source, info))
     return cells

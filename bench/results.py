@@ -13,6 +13,7 @@ from bench.scoring.errors import camera_errors, edge_metrics, summary
 from bench.scoring.oracle import ORACLE, Curve, curve
 from bench.scoring.roc import roc_auc
 from bench.scoring.statistics import tie_groups
+from bench.scoring.timing import speedup
 from bench.store import Job, Store
 
 if TYPE_CHECKING:
@@ -95,6 +96,8 @@ def score(
             _collect(collected, store, job, instances[key], rule, oracle)
     plans = store.plans()
     footnotes = [*collected.notes, *(plans[-1].missing if plans else ())]
+    if any("timing" in row for row in collected.rows):
+        _compare_times(collected.rows, plans[-1].baseline)
     ties = {
         place: tie_groups(
             {method: _stacked(errors) for method, errors in by_method.items()},
@@ -151,6 +154,7 @@ def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, 
             **{name: record.get(name) for name in ("iterations", "stop_reason", "cost", "certificate")},
             "notes": "; ".join(record.get("notes", ())),
             "job": job.id,
+            **_times(job, record),
         }
     )
     if along is not None:
@@ -159,16 +163,43 @@ def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, 
             collected.rows.append(_oracle_row(collected.rows[-1], along))
 
 
+def _times(job: Job, record: Mapping[str, Any]) -> dict[str, Any]:
+    """What only the rows of a timing run have."""
+    if job.rounds == 0:
+        return {}
+    rounds = {"timing": True, "rounds": job.rounds, "round_s": record.get("round_s", ())}
+    return rounds | {name: record.get(name) for name in ("min_s", "waited")}
+
+
+def _compare_times(rows: list[dict[str, Any]], baseline: str) -> None:
+    """Add to every row how many times faster than the baseline on the same problem it was."""
+
+    def place(row: Mapping[str, Any]) -> Place:
+        return row["dataset"], row["instance"], row["protocol"]
+
+    named = [row for row in rows if f"{row['method']}[{row['params']}]".removesuffix("[]") == baseline]
+    of_seed = {(place(row), row["seed"]): row["round_s"] for row in named}
+    of_any = {place(row): row["round_s"] for row in reversed(named)}  # a deterministic baseline has one seed
+    for row in rows:
+        own, base = row["round_s"], of_seed.get((place(row), row["seed"]), of_any.get(place(row), ()))
+        both = speedup(base, own) if own and len(own) == len(base) else (None, None, None)
+        row |= dict(zip(("speedup", "speedup_low", "speedup_high"), both, strict=True)) | {"baseline": baseline}
+
+
 def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
     """The row of an estimate's best checkpoint; what only its end has is left out."""
     pick = along.oracle
     count = len(along.iterations)
     absent = dict.fromkeys(
-        ("peak_mib", "cost", "certificate", "roc_auc", *(k for k in row if k.startswith(("residual", "cost_"))))
+        (
+            *("peak_mib", "cost", "certificate", "roc_auc", "min_s"),
+            *(k for k in row if k.startswith(("residual", "cost_"))),
+        )
     )
     return {
         **row,
         **absent,
+        **({"round_s": ()} if "round_s" in row else {}),
         **summary(along.errors[pick]),
         "params": ",".join(filter(None, [row["params"], ORACLE])),
         "solve_s": along.seconds[pick],

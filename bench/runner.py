@@ -14,7 +14,9 @@ from bench.errors import InputError
 from bench.execution import outcome
 from bench.execution.local import Finished, LocalEngine
 from bench.execution.supervise import Limits
+from bench.execution.timing import TimingEngine
 from bench.experiment import Cell, Experiment, Suite
+from bench.selection import format_selection
 from bench.store import Plan, Store
 
 Rerun = Literal["never", "failed", "always"]
@@ -28,7 +30,7 @@ class Options:
     Parameters
     ----------
     out
-        Folder of the run; by default ``results/runs/<suite>``.
+        Folder of the run; by default ``results/runs/<suite>``, for timing runs ``results/runs/<suite>-timing``.
     data_dir
         Where data are looked for first.
     seeds, timeout_s, memory_gib
@@ -40,6 +42,10 @@ class Options:
     rerun
         Which jobs with a record are run again. "never" still repeats those that ended at a lower limit than
         today's, and those whose package was not installed.
+    timing
+        Time the jobs one after another on one core, in rounds; see `bench.execution.timing`.
+    rounds
+        Override the suite's.
     plugins
         Files with more methods and datasets; when no methods are named, their methods join the suite's.
     """
@@ -53,6 +59,8 @@ class Options:
     memory_gib: float | None = None
     protocol: str | None = None
     rerun: Rerun = "never"
+    timing: bool = False
+    rounds: int | None = None
     plugins: tuple[Path, ...] = ()
 
 
@@ -84,14 +92,25 @@ class Run:
         self.experiment = _resolved(suite, methods, datasets, options)
         if not self.experiment.cells:
             raise NothingToRunError(self.experiment.missing)
-        self.store = Store(options.out or RUNS_FOLDER / self.experiment.suite.name)
+        suffix = "-timing" if options.timing else ""
+        self.store = Store(options.out or RUNS_FOLDER / f"{self.experiment.suite.name}{suffix}")
+        _check_kind(self.store, options.timing)
         self.limits = Limits(self.experiment.suite.timeout_s, self.experiment.suite.memory_gib)
         self.todo = [cell for cell in self.cells if not self._done(cell)]
+        if options.timing:  # methods can be compared only where they took turns
+            affected = {cell.job.instance_key for cell in self.todo}
+            self.todo = [cell for cell in self.cells if cell.job.instance_key in affected]
 
     @property
     def cells(self) -> tuple[Cell, ...]:
         """Every cell of the experiment."""
         return self.experiment.cells
+
+    @property
+    def baseline(self) -> str:
+        """The suite's baseline as it is in tables, or the first method where that was not chosen."""
+        planned = [format_selection(cell.job.method, cell.job.parameters) for cell in self.cells]
+        return self.experiment.suite.baseline if self.experiment.suite.baseline in planned else planned[0]
 
     def _done(self, cell: Cell) -> bool:
         if self.options.rerun == "always":
@@ -118,12 +137,17 @@ class Run:
                 self.store.add_instance(cell.job.instance_key, cell.source.load())
         command = shlex.join(["python", "-m", "bench", *sys.argv[1:]])
         jobs = tuple(cell.job for cell in self.cells)
-        self.store.add_plan(Plan(self.experiment.suite.name, jobs, self.experiment.missing, command))
+        baseline = self.baseline if self.options.timing else ""
+        self.store.add_plan(Plan(self.experiment.suite.name, jobs, self.experiment.missing, command, baseline))
 
     def execute(self) -> Iterator[Finished]:
         """Run what is not done; yield each cell with its record as it is stored."""
-        workers = self.options.jobs or os.cpu_count() or 1
-        engine = LocalEngine(self.store, self.limits, workers, self.options.threads)
+        engine: LocalEngine | TimingEngine
+        if self.options.timing:
+            engine = TimingEngine(self.store, self.limits, self.options.threads)
+        else:
+            workers = self.options.jobs or os.cpu_count() or 1
+            engine = LocalEngine(self.store, self.limits, workers, self.options.threads)
         with contextlib.closing(engine.run(self.todo)) as finished:
             yield from finished
 
@@ -145,6 +169,7 @@ def _resolved(
         "methods": experiment.narrowed(suite.methods, methods) if methods else (*suite.methods, *plugged_in),
         "seeds": options.seeds,
         "timeout_s": options.timeout_s,
+        "rounds": options.rounds,
         "memory_gib": options.memory_gib,
     }
     if datasets:
@@ -154,11 +179,24 @@ def _resolved(
     suite = replace(suite, **{key: value for key, value in changes.items() if value is not None})
     _check_positive(suite)
     return experiment.resolve(
-        suite, known_methods, known_datasets, data_dir=options.data_dir, protocol=options.protocol
+        suite,
+        known_methods,
+        known_datasets,
+        data_dir=options.data_dir,
+        protocol=options.protocol,
+        timing=options.timing,
     )
 
 
+def _check_kind(store: Store, timing: bool) -> None:
+    """Times of packed jobs and of timing runs are not kept in one folder."""
+    rounds = {job.rounds > 0 for plan in store.plans() for job in plan.jobs}
+    if rounds - {timing}:
+        holds, wants = ("an ordinary", "a timing") if timing else ("a timing", "an ordinary")
+        raise InputError(f"{store.folder} holds {holds} run; give {wants} run a folder of its own with --out")
+
+
 def _check_positive(suite: Suite) -> None:
-    for name in ("seeds", "timeout_s", "memory_gib"):
+    for name in ("seeds", "timeout_s", "memory_gib", "rounds"):
         if getattr(suite, name) <= 0:
             raise InputError(f"{name} must be above zero, not {getattr(suite, name):g}")

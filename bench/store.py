@@ -52,6 +52,8 @@ class Job:
         The method, the title for tables, the module or file it is in, and the parameters that were given.
     seed
         Seed of the run.
+    rounds
+        How often a timing run times it; zero for the job of an ordinary run.
     """
 
     id: str
@@ -63,6 +65,7 @@ class Job:
     origin: str
     parameters: Mapping[str, Any]
     seed: int
+    rounds: int = 0
 
     @property
     def cell(self) -> tuple[str, str, str, str, int]:
@@ -72,12 +75,21 @@ class Job:
 
 @dataclass(frozen=True)
 class Plan:
-    """The jobs that one call of `run` asked for, and what it could not find."""
+    """The jobs that one call of `run` asked for, and what it could not find.
+
+    Parameters
+    ----------
+    suite, jobs, missing, command
+        Name of the suite, its jobs, a sentence for what is not on disk, and what was typed.
+    baseline
+        Of a timing run: the configured method that the others are compared with, as a selection.
+    """
 
     suite: str
     jobs: tuple[Job, ...]
     missing: tuple[str, ...] = ()
     command: str = ""
+    baseline: str = ""
 
 
 class Store:
@@ -111,7 +123,8 @@ class Store:
         for path in sorted((self.folder / "plans").glob("*.json")):
             content = _read_json(path)
             jobs = tuple(Job(**job) for job in content["jobs"])
-            found.append(Plan(content["suite"], jobs, tuple(content["missing"]), content["command"]))
+            missing, baseline = tuple(content["missing"]), content.get("baseline", "")
+            found.append(Plan(content["suite"], jobs, missing, content["command"], baseline))
         return found
 
     def jobs(self) -> list[Job]:

@@ -85,7 +85,7 @@ LOSSES: dict[str, Loss] = {
     "l1": Loss(lambda x: x, lambda x: 1 / np.maximum(x, SMALLEST_ANGLE)),
     "l1.5": Loss(lambda x: x**1.5 / 1.5, lambda x: np.maximum(x, SMALLEST_ANGLE) ** -0.5),
     "l-half": Loss(lambda x: 2 * np.sqrt(x), lambda x: np.maximum(x, SMALLEST_ANGLE) ** -1.5),
-    "geman-mcclure": Loss(lambda x: x**2 / (2 * (1 + x**2)), lambda x: (1 + x**2) ** -2.0, 1.0),
+    "geman-mcclure": Loss(lambda x: x**2 / (2 * (1 + x**2)), lambda x: 1 / (1 + x**2) ** 2, 1.0),
     "huber": Loss(lambda x: np.where(x < 1, x**2 / 2, x - 0.5), lambda x: 1 / np.maximum(x, 1), 1.345),
     "pseudo-huber": Loss(lambda x: np.sqrt(1 + x**2) - 1, lambda x: 1 / np.sqrt(1 + x**2), 1.345),
     "cauchy": Loss(lambda x: np.log1p(x**2) / 2, lambda x: 1 / (1 + x**2), 2.385),

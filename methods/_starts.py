@@ -44,12 +44,12 @@ def start_rotations(name: Start, problem: Problem, rng: np.random.Generator) -> 
     Parameters
     ----------
     name
-        "spectral": the normalised spectral solution. "spanning-tree": propagation along the tree of
-        `SpanningTree`, the one place where a problem's weights enter. "cemp-mst": propagation along the tree
-        that `CEMP` with its default parameters finds. "random": uniform on SO(3).
+        "spectral": the normalised spectral solution, D regularised by its mean. "spanning-tree": propagation
+        along the tree of `SpanningTree`, the one place where a problem's weights enter. "cemp-mst": propagation
+        along the tree that `CEMP` with its default parameters finds. "random": uniform on SO(3).
     """
     if name == "spectral":
-        return spectral.spectral_rotations(problem, tolerance=TOLERANCE)[0]
+        return spectral.spectral_rotations(problem, regularisation=1.0, tolerance=TOLERANCE)[0]
     if name == "spanning-tree":
         return tree_rotations(problem, problem.weights)
     if name == "cemp-mst":

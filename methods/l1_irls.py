@@ -8,12 +8,15 @@ from bench import so3
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
-from . import _edge_kernels, spectral
+from . import _edge_kernels, _laplacian, spectral
 from ._laplacian import LaplacianSolver
 from ._losses import LOSSES, Loss, LossName
 from ._starts import Start, Started, start_rotations
 
 SMALLEST_WEIGHT = 1e-10  # relative to the largest
+SLOW = 0.5  # mean step, relative to the one before, above which a stage creeps
+RELAXATION = 1.5  # factor of the steps of a stage that creeps
+LINEAR_TOLERANCE = 0.03  # of the least squares problems of large graphs; the next iteration corrects the rest
 
 
 @method("l1-irls", title="L1-IRLS", cite="chatterjee2018", requires=("scipy", "numba"), robust=True)
@@ -23,7 +26,8 @@ class L1IRLS(Started):
 
     With R_i <- R_i exp(x_i) an edge asks for x_i - x_j = b_ij, where exp(b_ij) = R_i^T R_ij R_j. Each
     iteration minimises sum_ij w_ij |x_i - x_j - b_ij|^2 (one factorization of a weighted graph Laplacian
-    for the three columns of x) and moves all cameras.
+    for the three columns of x; on large graphs conjugate gradients, to a relative residual of 0.03, see
+    `LaplacianSolver`) and moves all cameras.
 
     1. Start from `init`.
     2. L1 stage: w_ij = 1 / |b_ij|, until the mean step is below the tolerance. After a spanning tree one
@@ -37,7 +41,9 @@ class L1IRLS(Started):
     does not depend on the gauge; the residuals of the second stage are those of the moved cameras, not of
     the linear system, and its first pass is weighted; the mean step is removed instead of anchoring a
     camera; the default start is spectral, theirs a spanning tree; weights are kept above 1e-10 of the
-    largest, so that losses that reject edges cannot disconnect the graph. The weights of a problem are used
+    largest, so that losses that reject edges cannot disconnect the graph; a step that is not half as long as
+    the one before is lengthened by half (the weighted problem majorises the loss, so that any factor below two
+    descends; a quarter of the iterations was saved on real scenes). The weights of a problem are used
     by the spanning-tree start alone.
 
     Parameters
@@ -52,7 +58,7 @@ class L1IRLS(Started):
     l1_iterations, irls_iterations
         Limits of the two stages.
     tolerance_deg
-        Mean step at which a stage ends; the published 0.001 rad is 0.057 degrees.
+        Mean step at which a stage ends; the default is the published 0.001 rad.
     """
 
     sigma_deg: float = 5.0
@@ -60,7 +66,7 @@ class L1IRLS(Started):
     init: Start = "spectral"
     l1_iterations: int = 10
     irls_iterations: int = 100
-    tolerance_deg: float = 0.05
+    tolerance_deg: float = 0.057
 
     def __post_init__(self) -> None:
         """Check the ranges."""
@@ -74,6 +80,7 @@ class L1IRLS(Started):
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
         spectral.compile_and_load()
+        _laplacian.compile_and_load()
         two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
         self.solve(two_cameras, np.random.default_rng())
 
@@ -102,13 +109,14 @@ class _Descent:
 
     def __init__(self, problem: Problem, start: Floats, tolerance: float) -> None:
         self.iterations = 0
-        self.cameras = so3.to_quaternion(start)
+        self.cameras = _quaternions(start)
         self.angles = np.empty(problem.m)
         self.vectors = np.empty((problem.m, 3))
         self._tolerance = tolerance
+        self._length = np.inf
         self._edges = problem.edges
-        self._measured = so3.to_quaternion(problem.rotations)
-        self._laplacian = LaplacianSolver(problem)
+        self._measured = _quaternions(problem.rotations)
+        self._laplacian = LaplacianSolver(problem, LINEAR_TOLERANCE)
         self._measure()
 
     def reweight(self, loss: Loss, scale: float, limit: int) -> bool:
@@ -122,22 +130,19 @@ class _Descent:
     def step(self, weights: Floats) -> float:
         """Move every camera to the minimum of the linearised problem; the mean step in radians."""
         steps = self._laplacian.solve(weights, self.vectors)
-        self.cameras = _turned(self.cameras, steps)
+        before, self._length = self._length, float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).mean())
+        if self._length > SLOW * before:
+            steps *= RELAXATION
+        _edge_kernels.turn(steps, self.cameras)
         self.iterations += 1
         self._measure()
-        return float(np.linalg.norm(steps, axis=1).mean())
+        return self._length
 
     def _measure(self) -> None:
         _edge_kernels.edge_residuals(self._edges, self._measured, self.cameras, self.vectors, self.angles)
 
 
-def _turned(cameras: Floats, steps: Floats) -> Floats:
-    """Quaternions (n, 4) of R_i exp(x_i), the x_i (n, 3) being `steps`; normalised."""
-    half = np.linalg.norm(steps, axis=1, keepdims=True) / 2
-    w, v = np.cos(half), np.sinc(half / np.pi) / 2 * steps
-    p, u = cameras[:, :1], cameras[:, 1:]
-    product: Floats = np.concatenate(
-        [p * w - (u * v).sum(axis=1, keepdims=True), p * v + w * u + np.cross(u, v)], axis=1
-    )
-    product /= np.linalg.norm(product, axis=1, keepdims=True)
-    return product
+def _quaternions(rotations: Floats) -> Floats:
+    result = np.empty((len(rotations), 4))
+    _edge_kernels.quaternions(rotations, result)
+    return result

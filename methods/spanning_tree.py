@@ -50,7 +50,7 @@ def tree_edges(problem: Problem, weights: Floats | None) -> EdgeIds:
 
 def propagated(problem: Problem, tree: EdgeIds) -> Floats:
     """Rotations (n, 3, 3) that fit the edges of `tree` exactly, from the camera of highest degree."""
-    root = _root(problem)
+    root = hub(problem)
     parent, depth = _search(problem, tree, root)
     i, j = problem.edges[tree].T
     upward = parent[i] == j
@@ -65,7 +65,7 @@ def propagated(problem: Problem, tree: EdgeIds) -> Floats:
     return rotations
 
 
-def _root(problem: Problem) -> int:
+def hub(problem: Problem) -> int:
     """Camera of highest degree, of several the one whose measurements have the smallest angles."""
     best = np.flatnonzero(problem.degree == problem.degree.max())
     if len(best) > 1:
@@ -89,12 +89,16 @@ def _heaviest_tree(problem: Problem, weights: Floats) -> EdgeIds:
 
 def _breadth_first_tree(problem: Problem) -> EdgeIds:
     """Of the edges that lead one level up from a camera, the one to the highest degree."""
-    _, depth = _search(problem, np.arange(problem.m), _root(problem))
+    _, depth = _search(problem, np.arange(problem.m), hub(problem))
     difference = np.diff(depth[problem.edges], axis=1)[:, 0]
     candidates = np.flatnonzero(difference)
     i, j = problem.edges[candidates].T
     child, parent = np.where(difference[candidates] > 0, (j, i), (i, j))
-    order = np.lexsort((so3.angle(problem.rotations[candidates]), -problem.degree[parent], child))
+    highest = np.zeros(problem.n, dtype=problem.degree.dtype)
+    np.maximum.at(highest, child, problem.degree[parent])
+    kept = np.flatnonzero(problem.degree[parent] == highest[child])
+    candidates, child = candidates[kept], child[kept]
+    order = np.lexsort((so3.angle(problem.rotations[candidates]), child))
     _, first = np.unique(child[order], return_index=True)
     return candidates[order[first]]
 

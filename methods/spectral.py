@@ -11,7 +11,7 @@ from bench.registry import method
 
 from . import _edge_kernels
 from ._eigenspace import Eigenspace, dense_eigenspace, leading_eigenspace
-from .spanning_tree import tree_rotations
+from .spanning_tree import hub, tree_rotations
 
 SMALL = 100  # cameras; up to here LAPACK solves the full problem fastest
 NARROW = 0.2  # bandwidth over cameras, below which the shifted matrix is factored
@@ -64,6 +64,7 @@ def spectral_rotations(
     edge_weights: Floats | None = None,
     *,
     normalised: bool = True,
+    regularisation: float = 0.0,
     tolerance: float = PRECISE,
 ) -> tuple[Floats, Eigenspace]:
     """Rotations (n, 3, 3) by the steps of `Spectral`, the block of each edge multiplied by its weight.
@@ -71,8 +72,9 @@ def spectral_rotations(
     Up to 100 cameras LAPACK is called. A graph whose cameras can be numbered so that its bandwidth is small
     against their number (rings, trajectories, grids: reverse Cuthill-McKee tells) has a small spectral gap
     and a cheap factorization: Lanczos iterations on the inverse of the shifted matrix. Any other graph
-    mixes fast, and Lanczos iterations on the matrix itself converge; it is never formed. Both start from a
-    spanning tree, so that the result does not depend on a random vector.
+    mixes fast, and Lanczos iterations on the matrix itself converge; it is never formed. They start from a
+    spanning tree and from the neighbours of the camera of highest degree, so that the result does not depend
+    on a random vector.
 
     Parameters
     ----------
@@ -83,20 +85,23 @@ def spectral_rotations(
         `normalised` (a larger one would cut off a camera whose edges all weigh little), else the largest of all.
     normalised
         As in `Spectral`, D being the sum of the weights of a camera, its diagonal block included.
+    regularisation
+        How many times the mean of D is added to D. With outliers the leading eigenvectors tend to settle on a
+        few cameras of low degree at the rim of a large graph; this holds them in its middle (Chaudhuri, Chung
+        and Tsiatas 2012, for spectral clustering).
     tolerance
         Angle between the subspaces found and sought, in radians, at which the iteration ends.
     """
     weights = np.ones(problem.m) if edge_weights is None else np.ascontiguousarray(edge_weights)
     diagonal = np.full(problem.n, weights.max())
-    start = tree_rotations(problem, edge_weights)
+    scale = np.ones(problem.n)
     if normalised:
         sums = np.bincount(problem.edges.ravel(), np.repeat(weights, 2))
         diagonal = sums / problem.degree
-        scale = 1 / np.sqrt(diagonal + sums)
+        scale = 1 / np.sqrt(diagonal + sums + regularisation * (diagonal + sums).mean())
         weights = weights * scale[problem.edges].prod(axis=1)
         diagonal = diagonal * scale**2
-        start = start / scale[:, None, None]
-    found = _eigenspace(problem, weights, diagonal, start.reshape(-1, 3), tolerance)
+    found = _eigenspace(problem, weights, diagonal, scale, tolerance)
     blocks = found.vectors.reshape(-1, 3, 3)
     if np.sign(np.linalg.det(blocks)).sum() < 0:
         blocks = blocks * [1.0, 1.0, -1.0]
@@ -112,10 +117,12 @@ def compile_and_load() -> None:
         spectral_rotations(Problem(n, edges, np.tile(np.eye(3), (len(edges), 1, 1))))
 
 
-def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, start: Floats, tolerance: float) -> Eigenspace:
+def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, scale: Floats, tolerance: float) -> Eigenspace:
     if problem.n <= SMALL:
         return dense_eigenspace(problem.block_matrix(weights, diagonal).toarray())
-    if bandwidth(problem) < NARROW * problem.n:
+    highest = problem.degree.max()  # the bandwidth is at least half of it
+    if highest < 2 * NARROW * problem.n and bandwidth(problem) < NARROW * problem.n:
+        start = (tree_rotations(problem) / scale[:, None, None]).reshape(-1, 3)
         return leading_eigenspace(_inverse(problem, weights, diagonal, start), start, tolerance)
 
     def multiply(x: Floats) -> Floats:
@@ -124,7 +131,20 @@ def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, start: Floa
         _edge_kernels.block_product(problem.edges, problem.rotations, weights, diagonal, blocks, product)
         return product.reshape(-1, 3)
 
-    return leading_eigenspace(multiply, start, tolerance)
+    start = _neighbourhood(problem) / scale[:, None, None]
+    return leading_eigenspace(multiply, start.reshape(-1, 3), tolerance)
+
+
+def _neighbourhood(problem: Problem) -> Floats:
+    """Rotations (n, 3, 3) of the camera of highest degree and of its neighbours, as measured; zeros elsewhere."""
+    centre = hub(problem)
+    i, j = problem.edges.T
+    out, back = np.flatnonzero(i == centre), np.flatnonzero(j == centre)
+    rotations = np.zeros((problem.n, 3, 3))
+    rotations[centre] = np.eye(3)
+    rotations[j[out]] = np.swapaxes(problem.rotations[out], -1, -2)
+    rotations[i[back]] = problem.rotations[back]
+    return rotations
 
 
 def bandwidth(problem: Problem) -> int:

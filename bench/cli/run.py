@@ -32,7 +32,8 @@ def run(
         typer.Option("--dataset", "-d", metavar="D", help="Only these datasets; repeat for more."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the run.  [default: results/runs/SUITE]")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of the run.  [default: results/runs/SUITE or SUITE-timing]"),
     ] = None,
     data_dir: DataDirOption = None,
     seeds: Annotated[int | None, typer.Option(metavar="N", help="Seeds 0 to N-1.")] = None,
@@ -42,6 +43,11 @@ def run(
     memory: Annotated[float | None, typer.Option(metavar="GIB", help="Resident memory of one job.")] = None,
     protocol: ProtocolOption = None,
     align: AlignOption = Align.L1,
+    timing: Annotated[
+        bool,
+        typer.Option("--timing", help="Time the methods: one job at a time on one core, taking turns, in rounds."),
+    ] = False,
+    rounds: Annotated[int | None, typer.Option(metavar="N", help="Rounds of a timing run.  [default: 5]")] = None,
     rerun: Annotated[Rerun, typer.Option(help="Which finished jobs are run again.")] = Rerun.NEVER,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run, and run nothing.")] = False,
     plugin: PluginOption = None,
@@ -49,6 +55,9 @@ def run(
     """Run a suite: every method on every instance, each job in a child process with limits.
 
     What is done and unchanged is not run again: after Ctrl-C, the same command continues.
+
+    With --timing, the jobs are timed instead: the table has median and least solve time and the ratio to the
+    baseline of the suite (by default its first method).
     """
     from bench.runner import Options, Run
 
@@ -62,6 +71,8 @@ def run(
         memory_gib=memory,
         protocol=protocol.value if protocol else None,
         rerun=rerun.value,
+        timing=timing,
+        rounds=rounds,
         plugins=tuple(plugin or ()),
     )
     planned = Run(suite, method or (), dataset or (), options)
@@ -78,6 +89,8 @@ def _intention(planned: "Run") -> str:
     todo, total = len(planned.todo), len(planned.cells)
     instances = len({cell.job.instance_key for cell in planned.cells})
     done = f", {total - todo} of them done already" if todo < total else ""
+    if planned.options.timing:
+        done += f", timed in {planned.experiment.suite.rounds} rounds against {planned.baseline}"
     return (
         f"suite {planned.experiment.suite.name}: {total} jobs on {instances} instances{done} -> {planned.store.folder}"
     )

@@ -4,6 +4,7 @@ import threading
 from collections.abc import Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from bench.execution import outcome
@@ -67,22 +68,33 @@ class LocalEngine:
         if self.stop.is_set():
             raise Interrupted
         if cell.method.not_installed:
-            hint = Outcome(outcome.NOT_INSTALLED, cell.method.install_hint)
-            record = record_of(asdict(job), (), self.limits, hint, {})
-            self.store.add_record(job.id, record, None)
-            return cell, record
+            return not_installed(cell, self.store, self.limits)
         requires = cell.method.requires
         with self.store.work_folder() as work:
-            request = Request(
-                problem=str(self.store.problem_path(job.instance_key).resolve()),
-                origin=job.origin,
-                method=job.method,
-                parameters=dict(job.parameters),
-                seed=job.seed,
-                threads=self.threads,
-                folder=str(work.resolve()),
-            )
+            request = request_of(cell, self.store, work, self.threads)
             ended, report = execute(request, requires, self.launcher, self.limits, self.stop)
             record = record_of(asdict(job), requires, self.limits, ended, report)
             self.store.add_record(job.id, record, work / ESTIMATE_FILE if ended.kind == outcome.OK else None)
         return cell, record
+
+
+def request_of(cell: Cell, store: Store, folder: Path, threads: int) -> Request:
+    """What the child of a cell is told; its results go to `folder`."""
+    job = cell.job
+    return Request(
+        problem=str(store.problem_path(job.instance_key).resolve()),
+        origin=job.origin,
+        method=job.method,
+        parameters=dict(job.parameters),
+        seed=job.seed,
+        threads=threads,
+        folder=str(folder.resolve()),
+    )
+
+
+def not_installed(cell: Cell, store: Store, limits: Limits) -> Finished:
+    """Keep a record that says what a method lacks, and how to get it."""
+    hint = Outcome(outcome.NOT_INSTALLED, cell.method.install_hint)
+    record = record_of(asdict(cell.job), (), limits, hint, {})
+    store.add_record(cell.job.id, record, None)
+    return cell, record

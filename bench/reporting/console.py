@@ -20,8 +20,11 @@ from bench.reporting.rows import (
     Value,
     area,
     degrees,
+    exact_seconds,
+    is_timed,
     scenes,
     seconds,
+    speedup,
     times_note,
 )
 
@@ -63,11 +66,12 @@ def console_blocks(
     frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str] = (), *, width: int = 100
 ) -> RenderableType:
     """The same as something rich can draw, for a live display."""
-    blocks = [part for scene in scenes(frame, ties) for part in _block(scene, width)]
+    timed = is_timed(frame)
+    blocks = [part for scene in scenes(frame, ties) for part in _block(scene, width, timed)]
     return Group(*blocks, *(Text(line, style="dim") for line in _legend(frame)), *_notes(footnotes))
 
 
-def _block(scene: Scene, width: int) -> Iterator[RenderableType]:
+def _block(scene: Scene, width: int, timed: bool) -> Iterator[RenderableType]:
     facts = [f"{scene.cameras} cameras"]
     if math.isfinite(scene.edges_percent):
         facts.append(f"{scene.edges_percent:.1f} % of edges")
@@ -80,7 +84,7 @@ def _block(scene: Scene, width: int) -> Iterator[RenderableType]:
     yield Text(f"{' · '.join(facts)}{'' if scene.has_truth else NO_TRUTH}", style="dim")
     solved = [entry for entry in scene.entries if entry.ok]
     if solved:
-        yield _table(scene, solved, width)
+        yield _table(scene, solved, width, timed)
     remarks = [(e.label, e.failure) for e in scene.entries if e.failures]
     remarks += [(e.label, note) for e in scene.entries for note in e.notes]
     if remarks:
@@ -88,26 +92,30 @@ def _block(scene: Scene, width: int) -> Iterator[RenderableType]:
     yield Text()
 
 
-def _table(scene: Scene, entries: Iterable[Entry], width: int) -> Table:
+def _table(scene: Scene, entries: Iterable[Entry], width: int, timed: bool) -> Table:
     entries = list(entries)
     several = any(entry.seeds > 1 for entry in entries)
     partial = any(entry.ok < entry.seeds for entry in entries)
     of = "" if scene.has_truth else "residual_"
     columns = [(f"{of}mean_deg", "mean °"), (f"{of}median_deg", "median °")]
-    if scene.has_truth and width >= WIDE and not several:
-        columns += [("p90_deg", "p90 °"), ("within_5_deg", "<5°")]
-    if scene.has_roc:
-        columns.append(("roc_auc", "AUC"))
-    columns += [("solve_s", "time s"), ("peak_mib", "MiB")]
+    if timed:
+        columns += [("solve_s", "median s"), ("min_s", "min s"), ("speedup", "times faster")]
+    else:
+        if scene.has_truth and width >= WIDE and not several:
+            columns += [("p90_deg", "p90 °"), ("within_5_deg", "<5°")]
+        if scene.has_roc:
+            columns.append(("roc_auc", "AUC"))
+        columns += [("solve_s", "time s"), ("peak_mib", "MiB")]
     table = _empty_table()
     table.add_column("  method", overflow="fold", min_width=16)
     for _, title in columns:
         table.add_column(title, justify="right", no_wrap=True)
     if partial:
         table.add_column("seeds", justify="right", no_wrap=True)
-    table.add_column("solved/scored/all" if width >= WIDE and not several else "cameras", justify="right", no_wrap=True)
+    spelled = width >= WIDE and not several and not timed
+    table.add_column("solved/scored/all" if spelled else "cameras", justify="right", no_wrap=True)
     for entry in entries:
-        cells = [_cell(entry.values.get(name, Value(math.nan)), name) for name, _ in columns]
+        cells = [_cell(entry, name, timed) for name, _ in columns]
         if partial:
             cells.append(f"{entry.ok}/{entry.seeds}")
         cells.append(f"{entry.solved}/{entry.scored}/{scene.cameras}")
@@ -127,7 +135,12 @@ def _empty_table() -> Table:
     )
 
 
-def _cell(value: Value, name: str) -> str:
+def _cell(entry: Entry, name: str, timed: bool) -> str:
+    value = entry.values.get(name, Value(math.nan))
+    if name == "speedup":
+        return speedup(entry)
+    if timed and name in ("solve_s", "min_s"):
+        return exact_seconds(value.mean)
     if name == "within_5_deg":
         return f"{100 * value.mean:.0f} %" if value.known else "–"
     if name == "solve_s":

@@ -14,6 +14,7 @@ Configured = tuple[str, str]  # method, params
 Ties = Mapping[Place, Set[Configured]]
 
 OK = "ok"
+BUSY = 0.05  # of the time of a solution spent waiting for the core, from which on a table says so
 TIE_LEGEND = (
     "not told apart from the best median, nor by the mean (paired bootstrap over cameras and seeds, level 5 %, "
     "all pairs corrected; cameras of a scene are correlated)"
@@ -118,6 +119,10 @@ _VALUES = (
     "peak_mib",
     "residual_mean_deg",
     "residual_median_deg",
+    "min_s",
+    "speedup",
+    "speedup_low",
+    "speedup_high",
     "roc_auc",
 )
 ROC_LEGEND = "area under the ROC curve of a method's edge weights against the true outliers; 1 tells all of them apart"
@@ -196,10 +201,31 @@ def _mean(numbers: list[float]) -> float:
     return math.fsum(numbers) / len(numbers) if numbers else math.nan
 
 
+def is_timed(frame: pd.DataFrame) -> bool:
+    """Whether the rows are those of a timing run: the optional column ``timing`` is True on them."""
+    return "timing" in frame and bool(frame["timing"].all())
+
+
 def times_note(frame: pd.DataFrame) -> str:
-    """How the times were taken: the optional column ``timing`` is True on rows of a timing run."""
-    timed = "timing" in frame and bool(frame["timing"].all())
-    return "times from a timing run, one job at a time" if timed else "times from a packed accuracy run"
+    """How the times were taken."""
+    if not is_timed(frame):
+        return "times from a packed accuracy run"
+    note = "times from a timing run, one job at a time on one core"
+    if "speedup" not in frame:
+        return note
+    rounds, baseline = (" and ".join(dict.fromkeys(map(str, frame[name]))) for name in ("rounds", "baseline"))
+    waited = pd.to_numeric(frame["waited"], errors="coerce").max()
+    busy = f"; the machine was busy: up to {100 * waited:.0f} % of a time went by waiting for the core"
+    return (
+        f"{note}: median and least of {rounds} rounds in which the methods took turns, and how many times faster "
+        f"than {baseline} (ratio of the medians, least to greatest ratio of a round){busy if waited > BUSY else ''}"
+    )
+
+
+def speedup(entry: Entry) -> str:
+    """Ratio to the baseline as a table prints it, with its range."""
+    ratio, low, high = (entry.values.get(f"speedup{end}", Value(math.nan)).mean for end in ("", "_low", "_high"))
+    return f"{ratio:.3g} ({low:.3g} to {high:.3g})" if math.isfinite(ratio) else "–"
 
 
 def degrees(value: float) -> str:
@@ -207,6 +233,13 @@ def degrees(value: float) -> str:
     if not math.isfinite(value):
         return "–"
     return "0" if value == 0 else f"{value:.2f}" if value >= 0.005 else f"{value:.0e}"
+
+
+def exact_seconds(value: float) -> str:
+    """A time of a timing run as a table prints it, three digits however short it is."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.{max(2 - math.floor(math.log10(value)), 0)}f}" if value > 0 else "0"
 
 
 def area(value: float) -> str:

@@ -44,7 +44,8 @@ def render(
     frame
         Scored rows, one for each (scene, method, params, seed), with at least `COLUMNS` and ``title``. Used
         where present: ``p90_deg, within_5_deg, residual_mean_deg, residual_median_deg, edges_percent,
-        hardness, roc_auc, notes`` and ``timing`` (True on rows of a timing run).
+        hardness, roc_auc, notes`` and ``timing`` (True on rows of a timing run, which
+        then have ``rounds, baseline, min_s, speedup, speedup_low, speedup_high`` too).
     ties
         For each (dataset, instance, protocol) the (method, params) that cannot be told apart from the best.
     footnotes
