@@ -113,7 +113,6 @@ class _Descent:
         self.angles = np.empty(problem.m)
         self.vectors = np.empty((problem.m, 3))
         self._tolerance = tolerance
-        self._length = np.inf
         self._edges = problem.edges
         self._measured = _quaternions(problem.rotations)
         self._laplacian = LaplacianSolver(problem, LINEAR_TOLERANCE)
@@ -121,22 +120,27 @@ class _Descent:
 
     def reweight(self, loss: Loss, scale: float, limit: int) -> bool:
         """Iterate with the weights of `loss`; whether the mean step fell below the tolerance in time."""
+        length = np.inf
         for _ in range(limit):
             weights = loss.weight(self.angles / scale)
-            if self.step(np.maximum(weights, SMALLEST_WEIGHT * weights.max())) < self._tolerance:
+            length = self.step(np.maximum(weights, SMALLEST_WEIGHT * weights.max()), SLOW * length)
+            if length < self._tolerance:
                 return True
         return False
 
-    def step(self, weights: Floats) -> float:
-        """Move every camera to the minimum of the linearised problem; the mean step in radians."""
+    def step(self, weights: Floats, longest: float = np.inf) -> float:
+        """Move every camera to the minimum of the linearised problem; the mean step in radians.
+
+        Where that is above `longest`, the cameras move on beyond the minimum, by `RELAXATION`.
+        """
         steps = self._laplacian.solve(weights, self.vectors)
-        before, self._length = self._length, float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).mean())
-        if self._length > SLOW * before:
+        length = float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).mean())
+        if length > longest:
             steps *= RELAXATION
         _edge_kernels.turn(steps, self.cameras)
         self.iterations += 1
         self._measure()
-        return self._length
+        return length
 
     def _measure(self) -> None:
         _edge_kernels.edge_residuals(self._edges, self._measured, self.cameras, self.vectors, self.angles)
