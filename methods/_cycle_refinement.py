@@ -7,7 +7,8 @@ import numpy as np
 from bench import so3
 from bench.problem import Estimate, Floats, Problem
 
-from .l1_irls import SMALLEST_WEIGHT, _Descent
+from ._descent import Descent
+from ._iterate import SMALLEST_WEIGHT
 
 LARGEST_WEIGHT = 1e8
 KEPT_AT_LEAST = 0.8  # of the edges
@@ -49,7 +50,7 @@ def refined(
     Estimate
         Its `edge_weights` are the level^(-3/2) at the end, the worst edges included, so that they rank all edges.
     """
-    descent = _Descent(problem, start, np.radians(tolerance_deg))
+    descent = Descent(problem, start, np.radians(tolerance_deg))
     kept, converged = 1.0, False
     while not converged and descent.iterations < iterations:
         converged = descent.step(_weights(levels, kept)) < np.radians(tolerance_deg)

@@ -39,11 +39,8 @@ class Iterate:
 
     def turned(self, steps: Floats) -> "Iterate":
         """Where every camera is R_i exp(x_i), the x_i (n, 3) being `steps`."""
-        half = np.linalg.norm(steps, axis=1, keepdims=True) / 2
-        w, v = np.cos(half), np.sinc(half / np.pi) / 2 * steps
-        p, u = self.cameras[:, :1], self.cameras[:, 1:]
-        cameras = np.concatenate([p * w - (u * v).sum(axis=1, keepdims=True), p * v + w * u + np.cross(u, v)], axis=1)
-        cameras /= np.linalg.norm(cameras, axis=1, keepdims=True)
+        cameras = self.cameras.copy()
+        _edge_kernels.turn(steps, cameras)
         return _measured(self.edges, self.measured, cameras)
 
     @property

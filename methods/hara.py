@@ -10,9 +10,9 @@ from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
 from ._all_triangles import AllTriangles
+from ._descent import Descent
 from ._hierarchical_tree import hierarchical_tree, support_levels
 from ._losses import LOSSES
-from .l1_irls import _Descent
 from .spanning_tree import tree_edges
 
 QUANTILES = (0.1, 0.2, 0.3)
@@ -98,7 +98,7 @@ class HARA:
     def _refined(self, problem: Problem, start: Floats, kept: NDArray[np.bool_], notes: tuple[str, ...]) -> Estimate:
         loss = LOSSES["l-half"]
         filtered = Problem(problem.n, problem.edges[kept], problem.rotations[kept])
-        descent = _Descent(filtered, start, np.radians(self.tolerance_deg))
+        descent = Descent(filtered, start, np.radians(self.tolerance_deg))
         converged = False
         if self.irls_iterations:
             descent.step(np.ones(filtered.m))

@@ -5,18 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench import so3
-from bench.problem import Estimate, Floats, Problem
+from bench.problem import Estimate, Problem
 from bench.registry import method
 
-from . import _edge_kernels, _laplacian, spectral
-from ._laplacian import LaplacianSolver
-from ._losses import LOSSES, Loss, LossName
+from . import _laplacian, spectral
+from ._descent import Descent
+from ._losses import LOSSES, LossName
 from ._starts import Start, Started, start_rotations
-
-SMALLEST_WEIGHT = 1e-10  # relative to the largest
-SLOW = 0.5  # mean step, relative to the one before, above which a stage creeps
-RELAXATION = 1.5  # factor of the steps of a stage that creeps
-LINEAR_TOLERANCE = 0.03  # of the least squares problems of large graphs; the next iteration corrects the rest
 
 
 @method("l1-irls", title="L1-IRLS", cite="chatterjee2018", requires=("scipy", "numba"), robust=True)
@@ -86,7 +81,7 @@ class L1IRLS(Started):
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         loss, sigma = LOSSES[self.loss], np.radians(self.sigma_deg)
-        descent = _Descent(problem, start_rotations(self.init, problem, rng), np.radians(self.tolerance_deg))
+        descent = Descent(problem, start_rotations(self.init, problem, rng), np.radians(self.tolerance_deg))
         if self.init == "spanning-tree":
             descent.step(np.ones(problem.m))
         descent.reweight(LOSSES["l1"], 1.0, self.l1_iterations)
@@ -99,54 +94,3 @@ class L1IRLS(Started):
             stop_reason=f"mean step below {self.tolerance_deg:g} degrees" if converged else "iteration limit",
             cost=float(loss.value(scaled).sum()),
         )
-
-
-class _Descent:
-    """Cameras that move, with the residuals of the edges where they are now.
-
-    `cameras` (n, 4) are unit quaternions, `angles` (m,) and `vectors` (m, 3) the residuals in radians.
-    """
-
-    def __init__(self, problem: Problem, start: Floats, tolerance: float) -> None:
-        self.iterations = 0
-        self.cameras = _quaternions(start)
-        self.angles = np.empty(problem.m)
-        self.vectors = np.empty((problem.m, 3))
-        self._tolerance = tolerance
-        self._edges = problem.edges
-        self._measured = _quaternions(problem.rotations)
-        self._laplacian = LaplacianSolver(problem, LINEAR_TOLERANCE)
-        self._measure()
-
-    def reweight(self, loss: Loss, scale: float, limit: int) -> bool:
-        """Iterate with the weights of `loss`; whether the mean step fell below the tolerance in time."""
-        length = np.inf
-        for _ in range(limit):
-            weights = loss.weight(self.angles / scale)
-            length = self.step(np.maximum(weights, SMALLEST_WEIGHT * weights.max()), SLOW * length)
-            if length < self._tolerance:
-                return True
-        return False
-
-    def step(self, weights: Floats, longest: float = np.inf) -> float:
-        """Move every camera to the minimum of the linearised problem; the mean step in radians.
-
-        Where that is above `longest`, the cameras move on beyond the minimum, by `RELAXATION`.
-        """
-        steps = self._laplacian.solve(weights, self.vectors)
-        length = float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).mean())
-        if length > longest:
-            steps *= RELAXATION
-        _edge_kernels.turn(steps, self.cameras)
-        self.iterations += 1
-        self._measure()
-        return length
-
-    def _measure(self) -> None:
-        _edge_kernels.edge_residuals(self._edges, self._measured, self.cameras, self.vectors, self.angles)
-
-
-def _quaternions(rotations: Floats) -> Floats:
-    result = np.empty((len(rotations), 4))
-    _edge_kernels.quaternions(rotations, result)
-    return result

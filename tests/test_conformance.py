@@ -28,7 +28,7 @@ CONFIGURATIONS = [
     "mpls[init=[cemp-mst,spectral,spanning-tree,random]]",
     "desc[init=[gcw,spectral,cemp-mst,random]]",
     "desc[rate=1,descent_iterations=30]",
-    "l1-irls[loss=[l-half,magsac]]",
+    "l1-irls[loss=magsac]",
     "weiszfeld[init=[spanning-tree,spectral,random]]",
     "lie-averaging[init=[spanning-tree,spectral]]",
     "robust-lm[init=[spectral,spanning-tree]]",
