@@ -8,7 +8,7 @@ import numpy as np
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
-from . import spectral
+from . import _laplacian, spectral
 from ._cemp import inlier_weights, weighted_spectral
 from ._cycle_refinement import refined
 from ._simplex_descent import consistent_levels
@@ -80,6 +80,7 @@ class DESC:
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
         spectral.compile_and_load()
+        _laplacian.compile_and_load()
         two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
         self.solve(two_cameras, np.random.default_rng())
 

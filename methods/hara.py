@@ -9,6 +9,7 @@ from bench import so3
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
+from . import _laplacian
 from ._all_triangles import AllTriangles
 from ._descent import Descent
 from ._hierarchical_tree import hierarchical_tree, support_levels
@@ -73,6 +74,7 @@ class HARA:
 
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
+        _laplacian.compile_and_load()
         triangle = Problem(3, np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32), np.tile(np.eye(3), (3, 1, 1)))
         self.solve(triangle, np.random.default_rng())
 

@@ -36,7 +36,7 @@ class L1IRLS(Started):
     does not depend on the gauge; the residuals of the second stage are those of the moved cameras, not of
     the linear system, and its first pass is weighted; the mean step is removed instead of anchoring a
     camera; the default start is spectral, theirs a spanning tree; weights are kept above 1e-10 of the
-    largest, so that losses that reject edges cannot disconnect the graph; a step that is not half as long as
+    largest, so that losses that reject edges cannot disconnect the graph; a step more than half as long as
     the one before is lengthened by half (the weighted problem majorises the loss, so that any factor below two
     descends; a quarter of the iterations was saved on real scenes). The weights of a problem are used
     by the spanning-tree start alone.

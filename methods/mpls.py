@@ -7,7 +7,7 @@ import numpy as np
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
-from . import spectral
+from . import _laplacian, spectral
 from ._cemp import ITERATIONS, TRIANGLES, corruption_levels, tree_of_least_corruption
 from ._cycle_refinement import refined
 from ._starts import Start, start_rotations
@@ -69,6 +69,7 @@ class MPLS:
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
         spectral.compile_and_load()
+        _laplacian.compile_and_load()
         two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
         self.solve(two_cameras, np.random.default_rng())
 
