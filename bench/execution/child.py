@@ -52,6 +52,8 @@ class Request:
     repeat_s
         Of a timing run: the solution is computed again, for its time alone, until so many seconds went by;
         one that takes many times longer counts as it is. Zero for no timing.
+    warm_up
+        Whether the method compiles and loads before the clock starts.
     """
 
     problem: str
@@ -63,6 +65,7 @@ class Request:
     folder: str
     core: int | None = None
     repeat_s: float = 0.0
+    warm_up: bool = True
 
 
 def run(request: Request) -> None:
@@ -98,7 +101,7 @@ def _solve(request: Request, result: dict[str, Any]) -> Outcome:
         importlib.import_module(name)
     result["threads"] = _pin_threads(request.threads)
     result["core"] = _pin_core(request.core)
-    if hasattr(method, "warm_up"):
+    if request.warm_up and hasattr(method, "warm_up"):
         method.warm_up()
 
     cameras = np.flatnonzero(problem.components == 0)

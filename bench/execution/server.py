@@ -34,8 +34,17 @@ def main() -> None:
     for name in [*PRELOADED, *sys.argv[2:]]:
         with contextlib.suppress(Exception):  # the child imports it again, and reports the error in its row
             importlib.import_module(name)
+    if "numba" in sys.modules:
+        _start_numba()
     gc.freeze()  # children share these pages instead of copying them at their first collection
     _Server(connection).serve()
+
+
+def _start_numba() -> None:
+    """Compile something: numba sets up its compiler at the first call, half a second that no child need spend again."""
+    import numba
+
+    numba.njit(lambda x: x + 1)(1)
 
 
 class _Server:

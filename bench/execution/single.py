@@ -23,6 +23,8 @@ Answer = tuple[Outcome, dict[str, Any], Estimate | None]
 class SingleSolver:
     """A configured method that can be given one problem after another; a context manager.
 
+    It warms up before the first problem; the time of later ones includes what they load.
+
     Parameters
     ----------
     info, parameters
@@ -39,6 +41,7 @@ class SingleSolver:
         self.limits = limits
         self.threads = threads
         self.launcher = Launcher(threads)
+        self._warm_up = True
 
     def __enter__(self) -> Self:
         return self
@@ -63,7 +66,9 @@ class SingleSolver:
                 seed=seed,
                 threads=self.threads,
                 folder=name,
+                warm_up=self._warm_up,
             )
+            self._warm_up = False
             ended, report = execute(request, self.info.requires, self.launcher, self.limits, threading.Event())
             ok = ended.kind == outcome.OK
             return ended, report, load_estimate(folder / ESTIMATE_FILE, report) if ok else None
