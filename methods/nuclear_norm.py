@@ -24,7 +24,7 @@ ENTRY_STEP = 0.2  # threshold of an entry of E in one iteration, which sets the 
     cite="candes2011",
     requires=("scipy", "numba"),
     robust=True,
-    max_cameras=1000,
+    max_cameras=500,
     invariant_to_deg=2.0,  # entrywise misfits: what turning the frames does to two degrees of noise
 )
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class NuclearNorm:
     The weights of a problem are used by the spanning-tree start alone.
 
     Misfits are those of single entries, as in the source and in `dmf-synch`, so that the answer depends a little on the
-    frames of the cameras. All matrices are dense: at 1,000 cameras half a gigabyte.
+    frames of the cameras. All matrices are dense: half a minute at 500 cameras, which is what it is meant for at most.
 
     Parameters
     ----------
