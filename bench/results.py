@@ -40,7 +40,8 @@ class Results:
     alignment
         The rule that removed the gauge.
     curves
-        For each place and each configured method that gave checkpoints, the errors along them, one curve a seed.
+        For each place and each configured method that gave checkpoints, the errors along them, one curve a seed; empty
+        where they were not asked for.
     """
 
     frame: "pd.DataFrame"
@@ -67,6 +68,7 @@ def score(
     jobs: Sequence[Job] | None = None,
     *,
     oracle: bool = False,
+    checkpoints: bool = False,
 ) -> Results:
     """Score what is stored of a run; nothing is run.
 
@@ -80,9 +82,11 @@ def score(
         Keep the instances of one protocol only, and those of datasets that have none.
     jobs
         Only these; by default every job that was ever planned.
+    checkpoints
+        Score the checkpoints too, which takes their number times as long, for `Results.curves`.
     oracle
-        Add a row for the best checkpoint of every estimate that has checkpoints. Its parameters end in ``oracle``,
-        and it takes no part in ties.
+        Score them and add a row for the best checkpoint of every estimate that has checkpoints. Its parameters end in
+        ``oracle``, and it takes no part in ties.
     """
     import pandas as pd
 
@@ -93,23 +97,28 @@ def score(
         if key not in instances:
             instances[key] = store.instance(key)
         if protocol in (None, instances[key].protocol) or instances[key].protocol == "all":
-            _collect(collected, store, job, instances[key], rule, oracle)
+            _collect(collected, store, job, instances[key], rule, oracle, checkpoints or oracle)
     plans = store.plans()
     footnotes = [*collected.notes, *(plans[-1].missing if plans else ())]
     if any("timing" in row for row in collected.rows):
         _compare_times(collected.rows, plans[-1].baseline)
     ties = {
-        place: tie_groups(
-            {method: _stacked(errors) for method, errors in by_method.items()},
-            same_cameras=len(collected.instances_of[place]) == 1,
-        )
+        place: _tied(by_method, same_cameras=len(collected.instances_of[place]) == 1)
         for place, by_method in collected.errors.items()
     }
     errors = {place: {m: tuple(e) for m, e in by_method.items()} for place, by_method in collected.errors.items()}
     return Results(pd.DataFrame(collected.rows), errors, ties, tuple(footnotes), rule, collected.curves)
 
 
-def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, rule: str, oracle: bool) -> None:
+def _collect(
+    collected: _Collected,
+    store: Store,
+    job: Job,
+    instance: Instance,
+    rule: str,
+    oracle: bool,
+    checkpoints: bool,
+) -> None:
     dataset = selection.parse(job.dataset).name
     place = (dataset, job.instance, instance.protocol)
     method = (job.method, selection.format_parameters(dict(job.parameters)))
@@ -129,7 +138,7 @@ def _collect(collected: _Collected, store: Store, job: Job, instance: Instance, 
             scores["roc_auc"] = roc_auc(estimate.edge_weights, instance.outliers)
         if instance.truth is not None:
             errors = camera_errors(rotations, instance.truth, rule)
-            along = curve(estimate, instance.truth, rule)
+            along = curve(estimate, instance.truth, rule) if checkpoints else None
     if instance.truth is not None:
         collected.errors.setdefault(place, {}).setdefault(method, []).append(errors)
     collected.rows.append(
@@ -207,6 +216,13 @@ def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
         "stop_reason": ORACLE,
         "notes": f"{ORACLE}: checkpoint {pick + 1} of {count}, picked by the smallest error against ground truth",
     }
+
+
+def _tied(by_method: Mapping[Configured, list[Floats]], same_cameras: bool) -> set[Configured]:
+    """Ties; on one instance a deterministic method ran once, and would have done the same under every seed."""
+    seeds = max(map(len, by_method.values()))
+    repeated = {m: errors * (seeds if same_cameras and len(errors) == 1 else 1) for m, errors in by_method.items()}
+    return tie_groups({m: _stacked(errors) for m, errors in repeated.items()}, same_cameras=same_cameras)
 
 
 def _stacked(errors: list[Floats]) -> Floats:

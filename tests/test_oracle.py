@@ -81,5 +81,5 @@ def test_the_oracle_is_a_row_of_its_own_on_request_only(run: Run) -> None:
 def test_the_figure_of_errors_over_iterations_is_drawn(run: Run, tmp_path: Path) -> None:
     from bench.reporting.present import write_plots
 
-    paths = write_plots(score(run.store), tmp_path / "plots")
+    paths = write_plots(score(run.store, checkpoints=True), tmp_path / "plots")
     assert {p.suffix for p in paths if p.stem == "error-over-iterations"} == {".png", ".pdf", ".svg"}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.errors import InputError
-from bench.results import score
+from bench.results import _tied, score
 from bench.runner import Options, Run
 from bench.store import Store
 
@@ -150,3 +150,11 @@ def test_bad_options_are_one_sentence(
 def test_opening_a_folder_that_is_no_run(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is not the folder of a run"):
         Store.open(tmp_path)
+
+
+def test_a_method_that_ran_once_ties_with_one_that_ran_under_every_seed() -> None:
+    """On one instance a deterministic method has one seed, and must not drop out of the comparison for that."""
+    errors = np.random.default_rng(0).uniform(1, 2, 60)
+    once, often, worse = ("once", ""), ("often", ""), ("worse", "")
+    by_method = {once: [errors], often: [errors * 1.001, errors, errors * 0.999], worse: [errors * 2]}
+    assert _tied(by_method, same_cameras=True) == {once, often}

@@ -89,6 +89,7 @@ def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Comput
     """Run what is not done, then score the jobs of the item."""
     from bench.papers.claims import Claims
     from bench.papers.computed import Computed
+    from bench.papers.speedup import Speedup
     from bench.results import score
     from bench.runner import NothingToRunError, Run
 
@@ -112,7 +113,7 @@ def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Comput
     store = runs[0].store
     jobs = [cell.job for planned in runs for cell in planned.cells]
     notes = {job.instance: store.instance(key).notes for key, job in {job.instance_key: job for job in jobs}.items()}
-    scores = score(store, rule, jobs=jobs, oracle=isinstance(item, Claims))
+    scores = score(store, rule, jobs=jobs, oracle=isinstance(item, Claims), checkpoints=isinstance(item, Speedup))
     return Computed(jobs, scores, notes, tuple(missing), lambda job: store.instance(job.instance_key))
 
 

@@ -20,6 +20,6 @@ def plot(
     from bench.store import Store
 
     folder = run_folder(run)
-    results = score(Store.open(folder), align.value, protocol.value if protocol else None)
+    results = score(Store.open(folder), align.value, protocol.value if protocol else None, checkpoints=True)
     for path in write_plots(results, out or folder / "plots"):
         typer.echo(path)

@@ -115,7 +115,7 @@ def _present(planned: "Run", align: Align) -> None:
     from bench.reporting.present import render_table, write_plots, write_tables
     from bench.results import score
 
-    results = score(planned.store, align.value, planned.options.protocol)
+    results = score(planned.store, align.value, planned.options.protocol, checkpoints=True)
     width = shutil.get_terminal_size((100, 24)).columns
     text, _ = render_table(results, "console", width=width, terminal=sys.stdout.isatty())
     typer.echo(f"\n{text}")
