@@ -11,6 +11,7 @@ from bench.registry import method
 
 from . import _dmf_dense, _dmf_thin, spectral
 from ._dmf_thin import Factors, Loss, Observed, Report, nearest_rotations
+from ._starts import SEEDED, Start, start_rotations
 
 START_TOLERANCE = 1e-3  # radians; the descent moves further than that
 EXTRA = 0.1  # size of the columns beyond three at a spectral start, relative to a rotation's
@@ -47,8 +48,8 @@ class DMFSynch:
     - All factors start with equal singular values, the last as the transpose of the first, and so on
       inwards. The loss treats E and its transpose alike, so that gradient descent keeps this symmetry; one
       of the two ends is stored.
-    - The product starts at a spectral solution (see `spectral_start`). With ``start=random`` it starts from
-      nothing: a product of width eight descends first, and its leading eigenvectors are the start.
+    - The product starts at the rotations of `init`. With ``init=random`` it starts from nothing: a product
+      of width eight descends first, and its leading eigenvectors are the start.
     - The step falls to zero along half a cosine.
     - The default loss, "l1/2", is the mean over observed blocks of (|E_ij - R_ij|^2 + s^2)^(1/4), with the
       Frobenius norm, s falling geometrically from 20 degrees to `smoothing_deg`. Plain gradient steps
@@ -96,8 +97,9 @@ class DMFSynch:
     checkpoint_every
         Iterations between two checkpoints. None: 100 for thin, 1,000 for paper, 250 for dense, where the misfit is
         looked at as often.
-    start
-        Of thin: "spectral" (the default) or "random".
+    init
+        Of thin: where to start, see `start_rotations`, but for "spectral" (the default), see `spectral_start`, and
+        "random", see above.
     smoothing_deg
         Of thin: the last s, 0.3 degrees for "l1/2" and 0.03 for "l1" unless given.
     init_scale
@@ -116,14 +118,14 @@ class DMFSynch:
     momentum: float = 0.9
     iterations: int | None = None
     checkpoint_every: int | None = None
-    start: Literal["spectral", "random", None] = None
+    init: Literal[Start, None] = None
     smoothing_deg: float | None = None
     init_scale: float | None = None
     stop: Literal["misfit", "limit", None] = None
     device: str | None = None
 
     def __post_init__(self) -> None:
-        foreign = ("init_scale", "stop", "device") if self.preset == "thin" else ("start", "smoothing_deg")
+        foreign = ("init_scale", "stop", "device") if self.preset == "thin" else ("init", "smoothing_deg")
         for name in foreign:
             if getattr(self, name) is not None:
                 raise ValueError(f"parameter '{name}' has no meaning for preset={self.preset}")
@@ -149,7 +151,7 @@ class DMFSynch:
     @property
     def deterministic(self) -> bool:
         """The thin form draws nothing unless it starts at random or is wider than three."""
-        return self.preset == "thin" and self.start != "random" and (self.width or 3) == 3
+        return self.preset == "thin" and self.init not in SEEDED and (self.width or 3) == 3
 
     @property
     def exact_to_deg(self) -> float:
@@ -157,10 +159,12 @@ class DMFSynch:
         return 0.01 if self.preset == "thin" else 2.0
 
     @property
-    def invariant_to_deg(self) -> float:
+    def invariant_to_deg(self) -> float | None:
         """The entry-wise l1 loss depends on the frames of the cameras, as the dense form does on its random start."""
         if self.preset != "thin":
             return 2.0
+        if self.init == "random":
+            return None
         return 1.0 if self.loss == "l1" else 0.01
 
     def warm_up(self) -> None:
@@ -206,14 +210,15 @@ class DMFSynch:
     ) -> tuple[Floats, Floats]:
         """Singular values and vectors of the first product."""
         width = min(self.width or 3, 3 * problem.n)
-        if self.start == "random":
+        if self.init == "random":
             wide = min(max(WIDE, width), 3 * problem.n)
             columns = rng.standard_normal((3 * problem.n, wide)) / np.sqrt(wide)
             factors = Factors.balanced(*_eigenpairs(columns * scale), self.layers)
             self._descend(observed, factors, WIDE_LR * (self.lr or 0.05), self.iterations or 500)
             values, vectors = factors.eigenpairs()
             return values[:width], vectors[:, :width]
-        rotations = spectral_start(problem)
+        init = self.init or "spectral"
+        rotations = spectral_start(problem) if init == "spectral" else start_rotations(init, problem, rng)
         extra = EXTRA * rng.standard_normal((3 * problem.n, width - 3))
         return _eigenpairs(np.hstack([rotations.reshape(-1, 3), extra]) * scale)
 

@@ -46,6 +46,7 @@ CONFIGURATIONS = [
     "colmap",
     "dmf-synch[depth=[2,3,5]]",
     "dmf-synch[loss=[l1,l2]]",
+    "dmf-synch[init=[cemp-mst,random]]",
     "dmf-synch[preset=dense]",
     "hara",
     "hara[filter_deg=180,irls_iterations=0]",

@@ -1,6 +1,7 @@
 """DMF-Synch: exact without noise, robust where spectral is not, and in its dense form the paper's recipe."""
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -52,8 +53,15 @@ def test_outliers_cost_little_at_any_depth(depth: int) -> None:
 def test_a_random_start_reaches_the_same_minimum(depth: int) -> None:
     problem, _ = simulated(NOISY, noise_deg=2, outliers=0.3)
     from_spectral = DMFSynch(depth=depth).solve(problem, rng())
-    from_nothing = DMFSynch(depth=depth, start="random").solve(problem, rng())
+    from_nothing = DMFSynch(depth=depth, init="random").solve(problem, rng())
     assert errors_deg(from_nothing.rotations, from_spectral.rotations).max() < 0.1
+
+
+@pytest.mark.parametrize("init", ["spanning-tree", "cemp-mst"])
+def test_other_starts_reach_the_same_minimum(init: Literal["spanning-tree", "cemp-mst"]) -> None:
+    problem, _ = simulated(NOISY, noise_deg=2, outliers=0.2)
+    expected = DMFSynch().solve(problem, rng()).rotations
+    assert errors_deg(DMFSynch(init=init).solve(problem, rng()).rotations, expected).max() < 0.1
 
 
 def test_relabelling_edge_order_and_direction_do_not_matter() -> None:
@@ -169,7 +177,7 @@ def test_checkpoints_tell_iteration_seconds_and_singular_values() -> None:
     ("selection", "complaint"),
     [
         ("dmf-synch[init_scale=1]", "'init_scale' has no meaning for preset=thin"),
-        ("dmf-synch[preset=dense,start=random]", "'start' has no meaning for preset=dense"),
+        ("dmf-synch[preset=dense,init=random]", "'init' has no meaning for preset=dense"),
         ("dmf-synch[preset=dense,loss=l1/2]", "not l1/2"),
         ("dmf-synch[depth=1]", "'depth' must be at least 2, not 1"),
         ("dmf-synch[lr=0]", "'lr' must be above zero"),
