@@ -155,8 +155,10 @@ class DMFSynch:
 
     @property
     def exact_to_deg(self) -> float:
-        """The dense form's step never falls, and leaves an oscillation on small graphs."""
-        return 0.01 if self.preset == "thin" else 2.0
+        """From a random start it may wind around a ring; the dense form's step never falls, and small graphs oscillate."""
+        if self.preset != "thin":
+            return 2.0
+        return 180.0 if self.init == "random" else 0.01
 
     @property
     def invariant_to_deg(self) -> float | None:
