@@ -17,15 +17,19 @@ SEEDED = ("cemp-mst", "random")  # starts that draw from the generator, so that 
 TOLERANCE = 1e-2  # radians between the eigenspace found and the true one; a start need not be better
 
 
-class Started:
-    """Promises of a method that depend on its start: a random one may end in another local minimum."""
+class Seeded:
+    """A method that draws nothing but its start."""
 
-    init: Start
+    init: str
 
     @property
     def deterministic(self) -> bool:
         """A start that draws from the generator is not."""
         return self.init not in SEEDED
+
+
+class Started(Seeded):
+    """Promises of a method that depend on its start: a random one may end in another local minimum."""
 
     @property
     def exact_to_deg(self) -> float:

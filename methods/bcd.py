@@ -11,7 +11,7 @@ from bench.registry import method
 from . import spectral
 from ._certificate import ROUNDING, chordal_cost, smallest_eigenvalue
 from ._rounding import rounded
-from ._starts import Start, start_rotations
+from ._starts import Seeded, Start, start_rotations
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -31,7 +31,7 @@ DEFICIENT = 1e-12  # eigenvalues below it, relative to the largest, count as zer
     exact_to_deg=1e-5,
 )
 @dataclass(frozen=True)
-class BCD:
+class BCD(Seeded):
     """Minimises the sum of squared chordal residuals, R R^T relaxed to Y positive semidefinite, by blocks of Y.
 
     1. Y = I, or 0.99 R R^T + 0.01 I from the rotations of `init`. The diagonal blocks of Y (3n, 3n) stay identities.
@@ -70,11 +70,6 @@ class BCD:
             raise ValueError(f"tolerance must not be negative, not {self.tolerance:g}")
         if self.max_epochs < 1:
             raise ValueError(f"max_epochs must be at least 1, not {self.max_epochs}")
-
-    @property
-    def deterministic(self) -> bool:
-        """A random start is not."""
-        return self.init != "random"
 
     def warm_up(self) -> None:
         """Compile what the starts use and load scipy."""

@@ -155,7 +155,7 @@ class DMFSynch:
 
     @property
     def exact_to_deg(self) -> float:
-        """From a random start it may wind around a ring; the dense form never stops to oscillate on small graphs."""
+        """From a random start it may wind around a ring; the dense form keeps oscillating on small graphs."""
         if self.preset != "thin":
             return 2.0
         return 180.0 if self.init == "random" else 0.01

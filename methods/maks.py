@@ -13,7 +13,7 @@ from . import spectral
 from ._certificate import certificate_matrix, chordal_cost, multipliers, smallest_eigenvalue
 from ._rounding import nearest_rotations
 from ._smallest import smallest_eigenspace
-from ._starts import Start, start_rotations
+from ._starts import Seeded, Start, start_rotations
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -25,7 +25,7 @@ ROUNDING = 1e-12  # of the gap, for each edge
 
 @method("maks", title="MAKS", cite="moreira2021", requires=("scipy", "numba"), certifies=True)
 @dataclass(frozen=True)
-class MAKS:
+class MAKS(Seeded):
     """Minimises the sum of squared chordal residuals by eigenvectors of Lambda - G, Lambda the multipliers.
 
     1. Lambda_i = degree of camera i times the identity, or the multipliers at `init`. G holds R_ij in block (i, j).
@@ -72,11 +72,6 @@ class MAKS:
             raise ValueError(f"tolerance must not be negative, not {self.tolerance:g}")
         if self.max_iterations < 1:
             raise ValueError(f"max_iterations must be at least 1, not {self.max_iterations}")
-
-    @property
-    def deterministic(self) -> bool:
-        """A random start is not."""
-        return self.init != "random"
 
     def warm_up(self) -> None:
         """Compile what the starts use and load scipy."""

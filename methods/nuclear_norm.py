@@ -9,7 +9,7 @@ from bench import so3
 from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
-from ._starts import SEEDED, Start, start_rotations
+from ._starts import Seeded, Start, start_rotations
 from .spectral import compile_and_load
 
 SMALL = 60  # cameras; up to here LAPACK finds all eigenvectors fastest
@@ -28,7 +28,7 @@ ENTRY_STEP = 0.2  # threshold of an entry of E in one iteration, which sets the 
     invariant_to_deg=2.0,  # entrywise misfits: what turning the frames does to two degrees of noise
 )
 @dataclass(frozen=True)
-class NuclearNorm:
+class NuclearNorm(Seeded):
     """Minimises |Z|_* + lambda |P(Z - X)|_1 over symmetric Z with Z_ii = I: singular values plus misfits, summed.
 
     X (3n, 3n) holds R_ij in block (i, j) and its transpose in block (j, i); P keeps those blocks. Z stands for all
@@ -80,11 +80,6 @@ class NuclearNorm:
                 raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
         if self.iterations < 1:
             raise ValueError(f"iterations must be at least 1, not {self.iterations}")
-
-    @property
-    def deterministic(self) -> bool:
-        """A start that draws from the generator is not."""
-        return self.init not in SEEDED
 
     def warm_up(self) -> None:
         """Compile what the spectral start uses and load scipy."""

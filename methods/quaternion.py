@@ -10,7 +10,7 @@ from bench.registry import method
 
 from ._davidson import block_laplacian, smallest_eigenspace
 from ._eigenspace import Eigenspace
-from ._starts import SEEDED, Start, start_rotations
+from ._starts import Seeded, Start, start_rotations
 from .spectral import PRECISE, compile_and_load
 
 SIGNS_TOLERANCE = 1e-3  # radians, of the solutions that only choose signs
@@ -26,7 +26,7 @@ for _axis in range(1, 4):
 
 @method("quaternion", title="Quaternion least squares", cite="govindu2001", requires=("scipy", "numba"))
 @dataclass(frozen=True)
-class Quaternion:
+class Quaternion(Seeded):
     """Minimises sum_ij |s_ij q_ij q_j - q_i|^2 over quaternions q_i of unit norm in total and signs s_ij.
 
     1. A rotation is two quaternions, q and -q, and the equations q_i = s_ij q_ij q_j are linear only once the signs
@@ -61,11 +61,6 @@ class Quaternion:
         """Check the range."""
         if self.sweeps < 1:
             raise ValueError(f"sweeps must be at least 1, not {self.sweeps}")
-
-    @property
-    def deterministic(self) -> bool:
-        """A start that draws from the generator is not."""
-        return self.init not in SEEDED
 
     def warm_up(self) -> None:
         """Compile what the spectral start uses and load scipy."""

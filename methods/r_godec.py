@@ -10,7 +10,7 @@ from bench.problem import Estimate, Floats, Problem
 from bench.registry import method
 
 from . import _edge_kernels
-from ._starts import SEEDED, TOLERANCE, Start, start_rotations
+from ._starts import TOLERANCE, Seeded, Start, start_rotations
 from .spectral import compile_and_load, spectral_rotations
 
 SUBSPACE_STEPS = 2  # in each iteration, towards the best approximation of rank three
@@ -27,7 +27,7 @@ NOISE = 0.02  # deviation of the entries of the measured rotations that the publ
     invariant_to_deg=0.01,  # entrywise thresholds
 )
 @dataclass(frozen=True)
-class RGoDec:
+class RGoDec(Seeded):
     """Minimises |P(X - L - S)|^2 / 2 + lambda |S|_1 over matrices L of rank three and sparse S.
 
     X (3n, 3n) holds R_ij in block (i, j), its transpose in block (j, i) and identities on the diagonal; P keeps those
@@ -76,11 +76,6 @@ class RGoDec:
             raise ValueError(f"tolerance must be positive, not {self.tolerance}")
         if self.iterations < 1:
             raise ValueError(f"iterations must be at least 1, not {self.iterations}")
-
-    @property
-    def deterministic(self) -> bool:
-        """A start that draws from the generator is not."""
-        return self.init not in SEEDED
 
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""

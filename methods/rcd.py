@@ -10,12 +10,12 @@ from bench.registry import method
 from . import _camera_kernels, spectral
 from ._certificate import ROUNDING, chordal_cost, smallest_eigenvalue
 from ._neighbours import neighbours_of
-from ._starts import Start, start_rotations
+from ._starts import Seeded, Start, start_rotations
 
 
 @method("rcd", title="RCD", cite="parra2021", requires=("scipy", "numba"), certifies=True)
 @dataclass(frozen=True)
-class RCD:
+class RCD(Seeded):
     """Minimises the sum of squared chordal residuals over one camera at a time.
 
     1. Start from `init`.
@@ -52,11 +52,6 @@ class RCD:
             raise ValueError(f"tolerance must not be negative, not {self.tolerance:g}")
         if self.max_epochs < 1:
             raise ValueError(f"max_epochs must be at least 1, not {self.max_epochs}")
-
-    @property
-    def deterministic(self) -> bool:
-        """A random start is not."""
-        return self.init != "random"
 
     @property
     def exact_to_deg(self) -> float:

@@ -11,7 +11,7 @@ from bench.registry import method
 from . import spectral
 from ._certificate import chordal_cost, smallest_eigenpair, smallest_eigenvalue
 from ._rounding import nearest_rotations
-from ._starts import Start, start_rotations
+from ._starts import Seeded, Start, start_rotations
 
 FIRST_STEP = 1.0  # radians, about, at the camera that moves most, when the staircase escapes
 SHORTEST_STEP = 1e-6
@@ -25,7 +25,7 @@ SHORTEST_STEP = 1e-6
     certifies=True,
 )
 @dataclass(frozen=True)
-class Staircase:
+class Staircase(Seeded):
     """Minimises the sum of squared chordal residuals over Y_i (3, p) with orthonormal rows, from p = 3 upward.
 
     1. Start from the rotations of `init`: p = 3.
@@ -69,11 +69,6 @@ class Staircase:
             raise ValueError(f"tolerance must be positive, not {self.tolerance:g}")
         if self.max_iterations < 1:
             raise ValueError(f"max_iterations must be at least 1, not {self.max_iterations}")
-
-    @property
-    def deterministic(self) -> bool:
-        """A random start is not."""
-        return self.init != "random"
 
     def warm_up(self) -> None:
         """Compile what the starts use; load scipy and pymanopt."""

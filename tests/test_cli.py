@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import bench
 
 COLUMNS = [
     "dataset",
@@ -31,14 +32,6 @@ COLUMNS = [
     "n_scored",
 ]
 SMALL = ("-m", "spanning-tree", "-m", "l1-irls", "-d", "erdos-renyi[n=15,missing=0.2]")
-
-
-def bench(*arguments: object, code: int = 0, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "bench", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=300)
-    assert done.returncode == code, f"{done.stdout}\n{done.stderr}"
-    assert "Traceback" not in done.stderr
-    return done
 
 
 def rows(text: str) -> list[dict[str, str]]:

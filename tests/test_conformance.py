@@ -6,6 +6,7 @@ import pytest
 
 from bench import registry
 from bench.conformance import CHECKS, check_method
+from bench.methods._starts import SEEDED
 
 METHODS = registry.catalog("method")
 CONFIGURATIONS = [
@@ -70,6 +71,13 @@ def test_built_in_methods_conform(text: str) -> None:
 
 def test_every_method_is_covered() -> None:
     assert {info.name for info, _ in METHODS.select(CONFIGURATIONS)} == {info.name for info in METHODS}
+
+
+@pytest.mark.parametrize("start", SEEDED)
+def test_no_method_is_deterministic_from_a_start_that_draws(start: str) -> None:
+    for info in METHODS:
+        if "init" in info.defaults():
+            assert not info.fact("deterministic", info.configure({"init": start})), info.name
 
 
 def failed(plugin: Path, fault: str) -> set[str]:

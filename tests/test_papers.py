@@ -2,13 +2,12 @@
 
 import csv
 import io
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from commands import bench
 from scenes import write_scene
 
 from bench.errors import InputError
@@ -85,79 +84,20 @@ method = "spectral"
 
 [[b.curves]]
 label = "bound"
-
-[c]
-kind = "claims"
-title = "Claims"
-alignment = "l1"
-published = "t.csv"
-seeds = 6
-forms = { "plain" = "spectral[normalised=false]" }
-
-[[c.statements]]
-sentence = "beats a tree"
-statistic = "mean_deg"
-datasets = ["erdos-renyi[n=14,outliers=0.0]"]
-forms = ["plain"]
-left = [{}]
-right = [{ method = "spanning-tree" }]
-
-[[c.statements]]
-sentence = "outliers help"
-statistic = "mean_deg"
-datasets = ["erdos-renyi[n=14]"]
-forms = ["plain"]
-left = [{ dataset = { outliers = 0.4 } }]
-right = [{ dataset = { outliers = 0.0 } }]
-
-[[c.statements]]
-sentence = "as good as Theirs"
-statistic = "median_deg"
-margin_deg = 0.5
-datasets = ["1dsfm[protocol=truth-subgraph]"]
-forms = ["plain"]
-left = [{}]
-right = [{ published = "Theirs" }]
-
-[s]
-kind = "speedup"
-title = "Faster"
-dataset = "erdos-renyi[n=12]"
-method = "dmf-synch[iterations=20]"
-recipe = "dmf-synch[preset=paper,depth=2,iterations=20,checkpoint_every=10]"
-iterations = 1000
-curves = "curves.csv"
-chosen = { depth = 2 }
-alignment = "l1"
 """
 PUBLISHED = """scene,n_cameras,edges_percent,hardness,Ours,Theirs,source
 Ellis Island,9,50,0.1000,0.8,1.3,here
 Madrid Metropolis,341,31,0.0029,2.3,1.7,here
 Alamo,577,50,0.0017,1.2,,here
 """
-CURVES = """depth,iteration,mean_deg,median_deg
-2,0,90,80
-2,500,1.5,1.25
-2,1000,3.5,2.5
-3,500,1.0,0.5
-"""
 
 
 @pytest.fixture
 def layout_file(tmp_path: Path) -> Path:
     (tmp_path / "t.csv").write_text(PUBLISHED)
-    (tmp_path / "curves.csv").write_text(CURVES)
     path = tmp_path / "a-paper.toml"
     path.write_text(LAYOUT)
     return path
-
-
-def bench(*arguments: object, code: int = 0, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "bench", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=300)
-    assert done.returncode == code, f"{done.stdout}\n{done.stderr}"
-    assert "Traceback" not in done.stderr
-    return done
 
 
 @pytest.mark.parametrize("name", paper_names())
@@ -300,52 +240,6 @@ def test_the_bound_is_drawn_where_least_squares_attains_it(layout_file: Path, tm
     assert np.sqrt(squares).tolist() == pytest.approx(points["least squares"].tolist())
 
 
-def test_sentences_are_judged_by_pairs_and_by_independent_samples(layout_file: Path, tmp_path: Path) -> None:
-    write_scene(tmp_path / "data" / "Ellis_Island", images=12)
-    write_scene(tmp_path / "data" / "Madrid_Metropolis", images=14)
-    command = ("paper", layout_file, "c", "--data-dir", tmp_path / "data", "--out", tmp_path / "run")
-    frame = pd.read_csv(io.StringIO(bench(*command, "--format", "csv").stdout))
-    honest = frame[frame["rule"] == "honest"].set_index("sentence")
-    assert honest["verdict"].to_dict() == {
-        "beats a tree": "holds",
-        "outliers help": "does not hold",
-        "as good as Theirs": "cannot tell",
-    }
-    assert honest["pairs"].tolist() == [6, 0, 2]
-    scenes = honest.loc["as good as Theirs"]  # two scenes, and three comparisons to correct for
-    assert 0.05 < scenes["p_holds"] < 0.15
-    assert scenes["right_deg"] == pytest.approx((1.3 + 1.7) / 2)
-    assert scenes["left_deg"] == pytest.approx(scenes["right_deg"] + scenes["difference_deg"])
-    without_checkpoints = frame.groupby("sentence")["left_deg"].nunique()
-    assert (without_checkpoints == 1).all()
-    shown = " ".join(bench(*command, "--format", "markdown").stdout.split())
-    assert "| **holds** |" in shown
-    assert "honest, plain: “outliers help”: 1 does not hold (of 1)." in shown
-
-
-def test_the_oracles_pick_is_another_iterate(layout_file: Path, tmp_path: Path) -> None:
-    """Of a dense product that is run to its end, the oracle's iterate is better."""
-    text = LAYOUT.replace("spectral[normalised=false]", "dmf-synch[preset=dense,depth=2,stop=limit,iterations=2500]")
-    layout_file.write_text(text.replace("seeds = 6", "seeds = 2"))
-    done = bench("paper", layout_file, "c", "--out", tmp_path / "run", "--data-dir", tmp_path, "--format", "csv")
-    frame = pd.read_csv(io.StringIO(done.stdout)).set_index(["sentence", "rule"])
-    assert frame.loc[("outliers help", "oracle"), "left_deg"] < frame.loc[("outliers help", "honest"), "left_deg"]
-    assert "1dsfm" in done.stderr
-
-
-def test_the_time_of_a_recipe_is_that_of_its_iterations(layout_file: Path, tmp_path: Path) -> None:
-    done = bench("paper", layout_file, "s", "--out", tmp_path / "run", "--format", "csv")
-    ours, recipe = pd.read_csv(io.StringIO(done.stdout)).itertuples()
-    assert recipe.total_s == pytest.approx(1000 * recipe.iteration_s)
-    assert ours.times_less == pytest.approx(recipe.total_s / ours.total_s)
-    assert (recipe.mean_deg, recipe.median_deg) == (1.5, 1.25)
-    assert "times less" in bench("paper", layout_file, "s", "--out", tmp_path / "run").stdout
-
-    (layout_file.parent / "curves.csv").write_text(CURVES.replace("2,", "4,"))
-    refused = bench("paper", layout_file, "s", "--out", tmp_path / "run", code=2)
-    assert "has no rows with depth=2" in refused.stderr
-
-
 def test_the_clairvoyant_graph_is_the_same_without_its_outliers() -> None:
     info = catalog("dataset")["erdos-renyi"]
     (plain,), (without,) = (
@@ -404,7 +298,6 @@ def test_unknown_names_are_one_sentence(arguments: tuple[str, str], says: str) -
         ('kind = "scenes"', 'kind = "scene"', "kind must be one of"),
         ('statistic = "median_deg"\n', 'statistic = "median"\n', "statistic must be 'mean_deg' or 'median_deg'"),
         ('alignment = "l1"\nhigh', 'alignment = "l2"\nhigh', "did you mean 'l1'?"),
-        ('forms = ["plain"]', 'forms = ["plane"]', "did you mean 'plain'?"),
         ("values = [12, 16]", "value = [12, 16]", "unknown key 'value'; did you mean 'values'?"),
         ('title = "A paper"', "title = A paper", "is not valid TOML"),
     ],

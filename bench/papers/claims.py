@@ -11,7 +11,7 @@ from bench import selection
 from bench.errors import InputError
 from bench.execution import outcome
 from bench.experiment import Suite
-from bench.papers.computed import Computed, extended, label
+from bench.papers.computed import Computed, extended, label, spelled
 from bench.papers.published import SCENE, methods_of
 from bench.registry import suggestion
 from bench.scoring.difference import LEVEL, Difference, holm, paired, unpaired
@@ -193,7 +193,7 @@ class Claims:
         if computed.results is None:
             return {}
         place, method = label("dataset", extended(dataset, side.dataset)), label("method", self._method(form, side))
-        jobs = {job.id for job in computed.jobs if (job.dataset, _spelled(job)) == (place, method)}
+        jobs = {job.id for job in computed.jobs if (job.dataset, spelled(job)) == (place, method)}
         frame = computed.results.frame
         own = frame[frame["job"].isin(jobs) & (frame["status"] == outcome.OK)]
         by_oracle = own["stop_reason"] == ORACLE
@@ -256,7 +256,3 @@ def _columns(found: Difference) -> dict[str, float]:
 
 def _placed(name: str, side: Side) -> str:
     return f"{name}, {selection.format_parameters(dict(side.dataset))}" if side.dataset else name
-
-
-def _spelled(job: Any) -> str:
-    return selection.format_selection(job.method, dict(job.parameters))

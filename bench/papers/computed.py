@@ -56,6 +56,11 @@ def label(kind: str, text: str) -> str:
     return selection.format_selection(*one(kind, text))
 
 
+def spelled(job: Job) -> str:
+    """The method of a job, as `label` spells it."""
+    return selection.format_selection(job.method, dict(job.parameters))
+
+
 def extended(text: str, parameters: Mapping[str, Any]) -> str:
     """A selection with further parameters."""
     parsed = selection.parse(text)

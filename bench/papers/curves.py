@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from bench import selection
 from bench.execution import outcome
 from bench.experiment import Suite
-from bench.papers.computed import Computed, extended, label, one
+from bench.papers.computed import Computed, extended, label, one, spelled
 from bench.problem import Floats
 from bench.registry import catalog
 from bench.scoring.statistics import seed_half_width
@@ -118,7 +117,7 @@ class CurvePlot:
                 dataset = label("dataset", text)
                 jobs = by_dataset[dataset]
                 if method:
-                    found = scores.loc[[job.id for job in jobs if _spelled(job) == method]]
+                    found = scores.loc[[job.id for job in jobs if spelled(job) == method]]
                     well = found[found["status"] == outcome.OK]
                     errors = well[self.statistic].to_numpy(dtype=float)
                     seeds, scored = len(found), 100 * well["n_scored"].sum() / max(1, well["n_cameras"].sum())
@@ -148,10 +147,6 @@ class CurvePlot:
             for x in self.axis.values:
                 varied = {self.panel.parameter: panel, self.axis.parameter: x}
                 yield panel, x, extended(self.dataset, {**varied, **curve.dataset})
-
-
-def _spelled(job: Job) -> str:
-    return selection.format_selection(job.method, dict(job.parameters))
 
 
 def _bounds(jobs: Sequence[Job], computed: Computed) -> Floats:
