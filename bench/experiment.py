@@ -7,11 +7,13 @@ from typing import Any
 
 from bench import named, registry, selection
 from bench.errors import InputError
+from bench.plan import Job
 from bench.registry import Catalog, Info, Missing, Source, parameters_of
-from bench.store import SCHEMA, Job, digest
+from bench.store import digest
 
 DEFAULT_SUITE = "quick"
 SUITES = "bench.suites"
+IDENTITY = 1  # raised when what a job's id is made of changes, so that no old record is taken for a new one
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,8 @@ def resolve(
                 elif source.seeded or seed == 0:
                     cells += _cells_of(source, info, configured, label, seed, suite.seeds, chosen, rounds)
     sentences = (_absence(dataset, names, command) for (dataset, command), names in missing.items())
-    return Experiment(suite, tuple(cells), tuple(sentences))
+    unique = {cell.job.id: cell for cell in cells}  # a suite may name the same twice
+    return Experiment(suite, tuple(unique.values()), tuple(sentences))
 
 
 def _absence(dataset: str, names: Sequence[str], command: str) -> str:
@@ -178,7 +181,7 @@ def _cells_of(
         complete = parameters_of(configured_method)
         for method_seed in range(seeds) if repeated else (seed,):
             timed = [rounds] if rounds else []
-            identity = digest([SCHEMA, key, info.name, complete, info.source_hash, method_seed, *timed])
+            identity = digest([IDENTITY, key, info.name, complete, info.source_hash, method_seed, *timed])
             job = Job(
                 identity,
                 label,

@@ -1,26 +1,34 @@
 """Score what a run has stored: the table of rows, the per-camera errors behind it, ties and footnotes."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow.compute as pc
 
-from bench import selection
-from bench.execution import outcome
-from bench.problem import Floats, Instance
-from bench.scoring.errors import camera_errors, edge_metrics, summary
+from bench.plan import Job, newest
+from bench.problem import Floats
+from bench.scores import Scores, scores_of
+from bench.scoring.errors import summary
 from bench.scoring.oracle import ORACLE, Curve, curve
-from bench.scoring.roc import roc_auc
-from bench.scoring.statistics import tie_groups
+from bench.scoring.seed_ties import MANY_SEEDS, tied_by_seed
+from bench.scoring.statistics import tied
 from bench.scoring.timing import speedup
-from bench.store import Job, Store
+from bench.selection import format_parameters, parse
+from bench.store import Store
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
-Place = tuple[str, str, str]  # dataset, instance, protocol
-Configured = tuple[str, str]  # method, params
+Place = tuple[str, str, str]
+Configured = tuple[str, str]
+PLACE = ["dataset", "instance", "protocol"]
+CONFIGURED = ["method", "params"]
+TIMES = ["round_s", "min_s", "waited"]
+HIDDEN = ["stamp", "n_checkpoints", "has_truth", "instance_notes"]  # what is known of a job besides its row
 
 
 @dataclass(frozen=True)
@@ -52,15 +60,6 @@ class Results:
     curves: Mapping[Place, Mapping[Configured, Sequence[Curve]]]
 
 
-@dataclass
-class _Collected:
-    rows: list[dict[str, Any]] = field(default_factory=list)
-    errors: dict[Place, dict[Configured, list[Floats]]] = field(default_factory=dict)
-    instances_of: dict[Place, set[str]] = field(default_factory=dict)
-    notes: dict[str, None] = field(default_factory=dict)
-    curves: dict[Place, dict[Configured, list[Curve]]] = field(default_factory=dict)
-
-
 def score(
     store: Store,
     rule: str = "l1",
@@ -88,100 +87,113 @@ def score(
         Score them and add a row for the best checkpoint of every estimate that has checkpoints. Its parameters end in
         ``oracle``, and it takes no part in ties.
     """
+    plans = store.plans()
+    jobs = newest(plans) if jobs is None else jobs
+    scores = scores_of(store, jobs, rule)
+    if protocol is not None:
+        fits = np.isin(scores.table["protocol"].to_numpy(), [protocol, "all"])
+        jobs, scores = list(itertools.compress(jobs, fits)), scores.where(fits)
+    frame = _frame(jobs, scores.table, rule)
+    errors = CameraErrors(frame, scores)
+    ties = {place: _ties(errors, place, frame, jobs) for place in errors}
+    if "round_s" in frame:
+        _compare_times(frame, plans[-1].baseline)
+    curves: dict[Place, dict[Configured, list[Curve]]] = {}
+    if checkpoints or oracle:
+        along = _along(store, jobs, scores.table, rule)
+        for k, one in along.items():
+            place, method = tuple(frame.loc[k, PLACE]), tuple(frame.loc[k, CONFIGURED])
+            curves.setdefault(place, {}).setdefault(method, []).append(one)
+        if oracle:
+            frame = _with_oracle(frame, along)
+    footnotes = [*_instance_notes(frame, scores.table), *scores.unreadable, *(plans[-1].missing if plans else ())]
+    return Results(frame, errors, ties, tuple(footnotes), rule, curves)
+
+
+class CameraErrors(Mapping[Place, Mapping[Configured, tuple[Floats, ...]]]):
+    """Camera errors of scored jobs, read when they are asked for.
+
+    For each place that has ground truth and each configured method, its errors (n,) in degrees, one array a seed.
+    """
+
+    def __init__(self, frame: "pd.DataFrame", scores: Scores) -> None:
+        self._scores = scores
+        self.rows: dict[Place, dict[Configured, list[int]]] = {}
+        known = scores.table["has_truth"].to_numpy()
+        groups = frame.groupby([*PLACE, *CONFIGURED], sort=False, dropna=False).indices
+        for key, rows in sorted(groups.items(), key=lambda group: group[1][0]):
+            if known[rows].any():
+                self.rows.setdefault(key[:3], {})[key[3:]] = rows.tolist()
+
+    def __getitem__(self, place: Place) -> dict[Configured, tuple[Floats, ...]]:
+        return self.of(place)
+
+    def of(self, place: Place, seeds: int | None = None) -> dict[Configured, tuple[Floats, ...]]:
+        """Errors of a place under the first so many seeds."""
+        return {method: tuple(self._scores.errors(rows[:seeds])) for method, rows in self.rows[place].items()}
+
+    def __iter__(self) -> Iterator[Place]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+def _frame(jobs: Sequence[Job], table: "pa.Table", rule: str) -> "pd.DataFrame":
+    """One row a job: what was asked for, and how it scored."""
     import pandas as pd
 
-    collected = _Collected()
-    instances: dict[str, Instance] = {}
-    for job in store.jobs() if jobs is None else jobs:
-        key = job.instance_key
-        if key not in instances:
-            instances[key] = store.instance(key)
-        if protocol in (None, instances[key].protocol) or instances[key].protocol == "all":
-            _collect(collected, store, job, instances[key], rule, oracle, checkpoints or oracle)
-    plans = store.plans()
-    footnotes = [*collected.notes, *(plans[-1].missing if plans else ())]
-    if any("timing" in row for row in collected.rows):
-        _compare_times(collected.rows, plans[-1].baseline)
-    ties = {
-        place: _tied(by_method, same_cameras=len(collected.instances_of[place]) == 1)
-        for place, by_method in collected.errors.items()
-    }
-    errors = {place: {m: tuple(e) for m, e in by_method.items()} for place, by_method in collected.errors.items()}
-    return Results(pd.DataFrame(collected.rows), errors, ties, tuple(footnotes), rule, collected.curves)
-
-
-def _collect(
-    collected: _Collected,
-    store: Store,
-    job: Job,
-    instance: Instance,
-    rule: str,
-    oracle: bool,
-    checkpoints: bool,
-) -> None:
-    dataset = selection.parse(job.dataset).name
-    place = (dataset, job.instance, instance.protocol)
-    method = (job.method, selection.format_parameters(dict(job.parameters)))
-    collected.instances_of.setdefault(place, set()).add(job.instance_key)
-    collected.notes |= {f"{dataset}/{job.instance}: {note}": None for note in instance.notes}
-
-    record = store.record(job.id) or {"outcome": outcome.NOT_RUN, "status": outcome.NOT_RUN}
-    errors = np.full(instance.problem.n, np.nan)
-    scores: dict[str, Any] = {"n_solved": 0, "roc_auc": np.nan}
-    along = None
-    if record["outcome"] == outcome.OK:
-        estimate = store.estimate(job.id)
-        rotations = estimate.rotations
-        scores["n_solved"] = int(np.isfinite(rotations).all(axis=(1, 2)).sum())
-        scores |= edge_metrics(instance.problem, rotations, instance.truth)
-        if estimate.edge_weights is not None and instance.outliers is not None:
-            scores["roc_auc"] = roc_auc(estimate.edge_weights, instance.outliers)
-        if instance.truth is not None:
-            errors = camera_errors(rotations, instance.truth, rule)
-            along = curve(estimate, instance.truth, rule) if checkpoints else None
-    if instance.truth is not None:
-        collected.errors.setdefault(place, {}).setdefault(method, []).append(errors)
-    collected.rows.append(
+    spelled: dict[int, str] = {}  # jobs of one configuration share their parameters
+    params = [
+        spelled.get(id(job.parameters)) or spelled.setdefault(id(job.parameters), format_parameters(job.parameters))
+        for job in jobs
+    ]
+    datasets = {name: parse(name).name for name in {job.dataset for job in jobs}}
+    asked = pd.DataFrame(
         {
-            "dataset": dataset,
-            "instance": job.instance,
-            "method": job.method,
-            "title": job.title,
-            "params": method[1],
-            "seed": job.seed,
-            "protocol": instance.protocol,
-            "alignment": rule,
-            "status": record["status"],
-            **summary(errors),
-            "solve_s": record.get("solve_s"),
-            "peak_mib": record.get("peak_mib"),
-            "conversion_s": record.get("conversion_s"),
-            "n_cameras": instance.problem.n,
-            "n_edges": instance.problem.m,
-            **scores,
-            **{name: instance.statistics.get(name) for name in ("edges_percent", "hardness")},
-            **{name: record.get(name) for name in ("iterations", "stop_reason", "cost", "certificate")},
-            "notes": "; ".join(record.get("notes", ())),
-            "job": job.id,
-            **_times(job, record),
+            "dataset": [datasets[job.dataset] for job in jobs],
+            "instance": [job.instance for job in jobs],
+            "method": [job.method for job in jobs],
+            "title": [job.title for job in jobs],
+            "params": params,
+            "seed": [job.seed for job in jobs],
         }
     )
-    if along is not None:
-        collected.curves.setdefault(place, {}).setdefault(method, []).append(along)
-        if oracle:
-            collected.rows.append(_oracle_row(collected.rows[-1], along))
+    times = table.select(TIMES).to_pandas() if any(job.rounds for job in jobs) else pd.DataFrame()
+    scored = table.drop_columns([*HIDDEN, *TIMES]).to_pandas()
+    first = ["protocol", "alignment", "status"]
+    scored.insert(0, "alignment", rule)
+    scored = scored[[*first, *(name for name in scored if name not in (*first, "notes", "job")), "notes", "job"]]
+    if not times.empty:
+        times.insert(0, "timing", True)
+        times.insert(1, "rounds", [job.rounds for job in jobs])
+    return pd.concat([asked, scored, times], axis=1)
 
 
-def _times(job: Job, record: Mapping[str, Any]) -> dict[str, Any]:
-    """What only the rows of a timing run have."""
-    if job.rounds == 0:
-        return {}
-    rounds = {"timing": True, "rounds": job.rounds, "round_s": record.get("round_s", ())}
-    return rounds | {name: record.get(name) for name in ("min_s", "waited")}
+def _instance_notes(frame: "pd.DataFrame", table: "pa.Table") -> list[str]:
+    """Notes on instances, once each, with their names."""
+    notes = table["instance_notes"]
+    noted = np.flatnonzero(pc.list_value_length(notes).to_numpy() > 0)
+    said = {
+        f"{frame['dataset'][k]}/{frame['instance'][k]}: {note}": None for k in noted for note in notes[int(k)].as_py()
+    }
+    return list(said)
 
 
-def _compare_times(rows: list[dict[str, Any]], baseline: str) -> None:
+def _along(store: Store, jobs: Sequence[Job], table: "pa.Table", rule: str) -> dict[int, Curve]:
+    """For each row that has checkpoints, its errors along them."""
+    found = {}
+    for k in np.flatnonzero(table["n_checkpoints"].to_numpy() > 0).tolist():
+        truth = store.instance(jobs[k].instance_key).truth
+        along = None if truth is None else curve(store.estimate(jobs[k].id), truth, rule)
+        if along is not None:
+            found[k] = along
+    return found
+
+
+def _compare_times(frame: "pd.DataFrame", baseline: str) -> None:
     """Add to every row how many times faster than the baseline on the same problem it was."""
+    rows = frame.to_dict("records")
 
     def place(row: Mapping[str, Any]) -> Place:
         return row["dataset"], row["instance"], row["protocol"]
@@ -189,10 +201,22 @@ def _compare_times(rows: list[dict[str, Any]], baseline: str) -> None:
     named = [row for row in rows if f"{row['method']}[{row['params']}]".removesuffix("[]") == baseline]
     of_seed = {(place(row), row["seed"]): row["round_s"] for row in named}
     of_any = {place(row): row["round_s"] for row in reversed(named)}  # a deterministic baseline has one seed
+    ratios = []
     for row in rows:
         own, base = row["round_s"], of_seed.get((place(row), row["seed"]), of_any.get(place(row), ()))
-        both = speedup(base, own) if own and len(own) == len(base) else (None, None, None)
-        row |= dict(zip(("speedup", "speedup_low", "speedup_high"), both, strict=True)) | {"baseline": baseline}
+        ratios.append(speedup(base, own) if len(own) and len(own) == len(base) else (np.nan, np.nan, np.nan))
+    frame[["speedup", "speedup_low", "speedup_high"]] = np.array(ratios)
+    frame["baseline"] = baseline
+
+
+def _with_oracle(frame: "pd.DataFrame", along: Mapping[int, Curve]) -> "pd.DataFrame":
+    """Add the row of the best checkpoint after the row of each estimate that has checkpoints."""
+    import pandas as pd
+
+    rows = frame.to_dict("records")
+    added = pd.DataFrame([_oracle_row(rows[k], one) for k, one in along.items()], index=list(along))
+    both = pd.concat([frame, added.astype(frame.dtypes.to_dict(), errors="ignore")]).sort_index(kind="stable")
+    return both.reset_index(drop=True)
 
 
 def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
@@ -202,12 +226,13 @@ def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
     absent = dict.fromkeys(
         (
             *("peak_mib", "cost", "certificate", "roc_auc", "min_s"),
+            *("speedup", "speedup_low", "speedup_high"),
             *(k for k in row if k.startswith(("residual", "cost_"))),
         )
     )
     return {
         **row,
-        **absent,
+        **{name: value for name, value in absent.items() if name in row},
         **({"round_s": ()} if "round_s" in row else {}),
         **summary(along.errors[pick]),
         "params": ",".join(filter(None, [row["params"], ORACLE])),
@@ -218,16 +243,10 @@ def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
     }
 
 
-def _tied(by_method: Mapping[Configured, list[Floats]], same_cameras: bool) -> set[Configured]:
-    """Ties; on one instance a deterministic method ran once, and would have done the same under every seed."""
-    seeds = max(map(len, by_method.values()))
-    repeated = {m: errors * (seeds if same_cameras and len(errors) == 1 else 1) for m, errors in by_method.items()}
-    return tie_groups({m: _stacked(errors) for m, errors in repeated.items()}, same_cameras=same_cameras)
-
-
-def _stacked(errors: list[Floats]) -> Floats:
-    """(seeds, cameras), padded with NaN where the instances of the seeds differ in size."""
-    out = np.full((len(errors), max(len(e) for e in errors)), np.nan)
-    for row, e in zip(out, errors, strict=True):
-        row[: len(e)] = e
-    return out
+def _ties(errors: CameraErrors, place: Place, frame: "pd.DataFrame", jobs: Sequence[Job]) -> set[Configured]:
+    rows = errors.rows[place]
+    same_cameras = len({jobs[k].instance_key for of_method in rows.values() for k in of_method}) == 1
+    if same_cameras or max(map(len, rows.values())) <= MANY_SEEDS:
+        return tied(errors.of(place, MANY_SEEDS), same_cameras=same_cameras)
+    columns = frame[["seed", "median_deg", "mean_deg", "n_scored"]].to_numpy(dtype=float)
+    return tied_by_seed({method: columns[of_method] for method, of_method in rows.items()})

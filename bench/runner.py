@@ -16,8 +16,9 @@ from bench.execution.local import Finished, LocalEngine
 from bench.execution.supervise import Limits
 from bench.execution.timing import TimingEngine
 from bench.experiment import Cell, Experiment, Suite
+from bench.plan import Plan
 from bench.selection import format_selection
-from bench.store import Plan, Store
+from bench.store import Store
 
 Rerun = Literal["never", "failed", "always"]
 RUNS_FOLDER = Path("results", "runs")
@@ -93,8 +94,10 @@ class Run:
         if not self.experiment.cells:
             raise NothingToRunError(self.experiment.missing)
         suffix = "-timing" if options.timing else ""
-        self.store = Store(options.out or RUNS_FOLDER / f"{self.experiment.suite.name}{suffix}")
+        folder = options.out or RUNS_FOLDER / f"{self.experiment.suite.name}{suffix}"
+        self.store = Store.open(folder) if (folder / "plans").is_dir() else Store(folder)
         _check_kind(self.store, options.timing)
+        self.unreadable: list[str] = []  # a sentence for each record whose job is run again because of that
         self.limits = Limits(self.experiment.suite.timeout_s, self.experiment.suite.memory_gib)
         self.todo = [cell for cell in self.cells if not self._done(cell)]
         if options.timing:  # methods can be compared only where they took turns
@@ -115,7 +118,11 @@ class Run:
     def _done(self, cell: Cell) -> bool:
         if self.options.rerun == "always":
             return False
-        record = self.store.record(cell.job.id)
+        try:
+            record = self.store.record(cell.job.id)
+        except InputError as error:
+            self.unreadable.append(str(error))
+            return False
         if record is None or record["outcome"] == outcome.NOT_INSTALLED:
             return False
         if self.options.rerun == "failed":
@@ -131,6 +138,9 @@ class Run:
         InputError
             Where data are malformed; no plan is kept then.
         """
+        self.store.sweep()
+        for sentence in self.unreadable:
+            tell(sentence.replace("run the same command again", "its job is run again"))
         for cell in self.cells:
             if not self.store.problem_path(cell.job.instance_key).exists():
                 tell(f"loading {cell.job.dataset} {cell.job.instance}")
@@ -190,8 +200,7 @@ def _resolved(
 
 def _check_kind(store: Store, timing: bool) -> None:
     """Times of packed jobs and of timing runs are not kept in one folder."""
-    rounds = {job.rounds > 0 for plan in store.plans() for job in plan.jobs}
-    if rounds - {timing}:
+    if {plan.timing for plan in store.plans()} - {timing}:
         holds, wants = ("an ordinary", "a timing") if timing else ("a timing", "an ordinary")
         raise InputError(f"{store.folder} holds {holds} run; give {wants} run a folder of its own with --out")
 

@@ -1,35 +1,42 @@
 """What a run leaves on disk: plans, instances, records and estimates.
 
+    RUN/schema.json                    version of this layout
     RUN/plans/<time>-<hash>.json       which jobs were asked for, by one call of `run`
     RUN/instances/<key>/               problem.npz, truth.npz, instance.json
-    RUN/records/<id>.json              one job each, written last and by rename: it is there whole or not at all
-    RUN/estimates/<id>.npz             the arrays that the method returned, float64, unrounded
+    RUN/records/<id[:2]>/<id>.json     one job each, written last and by rename: it is there whole or not at all
+    RUN/estimates/<id[:2]>/<id>.npz    the arrays that the method returned, float64, unrounded
+    RUN/scores/                        what scoring has computed from these; may be deleted at any time
     RUN/work/                          what jobs in progress write
 
-No file is shared between jobs, so there is no lock. A job's id is a hash of everything that determines its
-result; where several plans name the same cell of the experiment, the newest plan's job is the one that counts.
+No file is shared between jobs, so there is no lock: any number of processes, on any number of machines, may write
+into one folder. A job's id is a hash of everything that determines its result; where several plans name the same
+cell of the experiment, the newest plan's job is the one that counts.
 """
 
-import dataclasses
+import contextlib
 import hashlib
 import json
 import os
 import shutil
+import socket
 import tempfile
+import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bench import migration
 from bench.arrays import load_estimate, load_problem, save_problem
 from bench.errors import InputError
+from bench.plan import Job, Plan, decode, encode, newest
 from bench.problem import Estimate, Instance
 
-SCHEMA = 1
+UNREADABLE = (OSError, EOFError, ValueError, KeyError, TypeError, IndexError, AttributeError, zipfile.BadZipFile)
 
 
 def digest(value: Any) -> str:
@@ -39,114 +46,74 @@ def digest(value: Any) -> str:
 
 
 @dataclass(frozen=True)
-class Job:
-    """One cell of an experiment: an instance, a configured method and a seed.
-
-    Parameters
-    ----------
-    id
-        Hash of the instance's content, the method's parameters and source, and the seed.
-    dataset, instance, instance_key
-        Selection of the dataset, name of the instance within it, and the folder of the instance.
-    method, title, origin, parameters
-        The method, the title for tables, the module or file it is in, and the parameters that were given.
-    seed
-        Seed of the run.
-    rounds
-        How often a timing run times it; zero for the job of an ordinary run.
-    """
-
-    id: str
-    dataset: str
-    instance: str
-    instance_key: str
-    method: str
-    title: str
-    origin: str
-    parameters: Mapping[str, Any]
-    seed: int
-    rounds: int = 0
-
-    @property
-    def cell(self) -> tuple[str, str, str, str, int]:
-        """What a reader calls this job, however its source or data have changed."""
-        return (self.dataset, self.instance, self.method, json.dumps(dict(self.parameters)), self.seed)
-
-
-@dataclass(frozen=True)
-class Plan:
-    """The jobs that one call of `run` asked for, and what it could not find.
-
-    Parameters
-    ----------
-    suite, jobs, missing, command
-        Name of the suite, its jobs, a sentence for what is not on disk, and what was typed.
-    baseline
-        Of a timing run: the configured method that the others are compared with, as a selection.
-    """
-
-    suite: str
-    jobs: tuple[Job, ...]
-    missing: tuple[str, ...] = ()
-    command: str = ""
-    baseline: str = ""
-
-
 class Store:
-    """The folder of a run."""
+    """The folder of a run.
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    Every writing method raises `InputError` where the system refuses to write (a full disk, a read-only folder);
+    what is there already stays as it is.
+    """
+
+    folder: Path
+    _made: set[Path] = field(default_factory=set, repr=False, compare=False)
 
     @classmethod
     def open(cls, folder: Path) -> "Store":
-        """Open a run for reading.
+        """Open a run that exists; one that an older version wrote is brought to today's layout first.
 
         Raises
         ------
         InputError
-            Where the folder holds no run.
+            Where the folder holds no run, or one of a newer version.
         """
         if not (folder / "plans").is_dir():
             raise InputError(f"{folder} is not the folder of a run; make one with: python -m bench run --out {folder}")
+        migration.migrate(folder)
         return cls(folder)
 
     def add_plan(self, plan: Plan) -> None:
         """Keep a plan."""
-        content = dataclasses.asdict(plan) | {"schema": SCHEMA}
+        if not (self.folder / migration.FILE).exists():
+            self._write_json(self.folder / migration.FILE, {"schema": migration.SCHEMA})
+        content = encode(plan) | {"schema": migration.SCHEMA}
         moment = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%f")
-        _write_json(self.folder / "plans" / f"{moment}-{digest(content)[:8]}.json", content)
+        self._write_json(self.folder / "plans" / f"{moment}-{digest(content)[:8]}.json", content, indent=None)
 
     def plans(self) -> list[Plan]:
-        """Every plan, oldest first."""
-        found = []
-        for path in sorted((self.folder / "plans").glob("*.json")):
-            content = _read_json(path)
-            jobs = tuple(Job(**job) for job in content["jobs"])
-            missing, baseline = tuple(content["missing"]), content.get("baseline", "")
-            found.append(Plan(content["suite"], jobs, missing, content["command"], baseline))
-        return found
+        """Every plan, oldest first.
+
+        Raises
+        ------
+        InputError
+            On the first that cannot be read.
+        """
+        return [self.plan(path) for path in sorted((self.folder / "plans").glob("*.json"))]
+
+    def plan(self, path: Path) -> Plan:
+        """Read one plan; raises `InputError` where that fails."""
+        try:
+            return decode(_read_json(path))
+        except UNREADABLE as error:
+            raise InputError(
+                f"{path} cannot be read ({_why(error)}); see: python -m bench doctor {self.folder} --repair"
+            ) from error
 
     def jobs(self) -> list[Job]:
         """The newest job of every cell that was ever planned, in the order of planning."""
-        newest: dict[tuple[str, str, str, str, int], Job] = {}
-        for plan in self.plans():
-            newest |= {job.cell: job for job in plan.jobs}
-        return list(newest.values())
+        return newest(self.plans())
 
     def add_instance(self, key: str, instance: Instance) -> None:
         """Keep an instance: the problem apart from the truth, which no method is given."""
         final = self.folder / "instances" / key
         if final.exists():
             return
-        with self.work_folder() as work:
+        with self.work_folder() as work, _writing(final):
             save_problem(work / "problem.npz", instance.problem)
             hidden: dict[str, Any] = {"truth": instance.truth, "outliers": instance.outliers}
             with (work / "truth.npz").open("wb") as file:
                 np.savez(file, **{name: value for name, value in hidden.items() if value is not None})
             facts = {f: getattr(instance, f) for f in ("name", "protocol", "source", "revision", "notes")}
             facts["statistics"] = dict(instance.statistics)
-            _write_json(work / "instance.json", facts)
+            self._write_json(work / "instance.json", facts)
             final.parent.mkdir(parents=True, exist_ok=True)
             try:
                 work.rename(final)
@@ -159,64 +126,124 @@ class Store:
         return self.folder / "instances" / key / "problem.npz"
 
     def instance(self, key: str) -> Instance:
-        """Read an instance back."""
+        """Read an instance back; raises `InputError` where that fails."""
         folder = self.folder / "instances" / key
-        with np.load(folder / "truth.npz", allow_pickle=False) as data:
-            truth = data.get("truth", None)
-            outliers = data.get("outliers", None)
-        facts = _read_json(folder / "instance.json")
-        facts["notes"] = tuple(facts["notes"])
-        return Instance(load_problem(folder / "problem.npz"), truth, outliers=outliers, **facts)
+        try:
+            with np.load(folder / "truth.npz", allow_pickle=False) as data:
+                truth = data.get("truth", None)
+                outliers = data.get("outliers", None)
+            facts = _read_json(folder / "instance.json")
+            facts["notes"] = tuple(facts["notes"])
+            return Instance(load_problem(folder / "problem.npz"), truth, outliers=outliers, **facts)
+        except UNREADABLE as error:
+            raise InputError(f"{folder} cannot be read ({_why(error)}); delete it and run again") from error
 
     def record(self, job_id: str) -> dict[str, Any] | None:
-        """Record of a job, or None where there is none that can be read."""
+        """Record of a job, or None where there is none.
+
+        Raises
+        ------
+        InputError
+            Where there is one that cannot be read.
+        """
+        path = self.record_path(job_id)
         try:
-            return _read_json(self._record_path(job_id))
-        except (FileNotFoundError, InputError):
+            record = _read_json(path)
+            if not isinstance(record["outcome"], str) or not isinstance(record["status"], str):
+                raise ValueError("no outcome")
+        except FileNotFoundError:
             return None
+        except UNREADABLE as error:
+            raise InputError(f"{path} cannot be read ({_why(error)}); run the same command again") from error
+        return record
 
     def add_record(self, job_id: str, record: Mapping[str, Any], estimate: Path | None) -> None:
         """Keep the record of a job and, before it, the file of its estimate."""
         if estimate is not None:
-            final = self._estimate_path(job_id)
-            final.parent.mkdir(parents=True, exist_ok=True)
-            estimate.replace(final)
-        _write_json(self._record_path(job_id), {**record, "schema": SCHEMA})
+            final = self.estimate_path(job_id)
+            with _writing(final):
+                self._make(final.parent)
+                estimate.replace(final)
+        self._write_json(self.record_path(job_id), {**record, "schema": migration.SCHEMA})
 
     def estimate(self, job_id: str) -> Estimate:
-        """Estimate of a job whose outcome is ``ok``."""
-        return load_estimate(self._estimate_path(job_id), self.record(job_id) or {})
+        """Estimate of a job whose outcome is ``ok``; raises `InputError` where it cannot be read."""
+        path = self.estimate_path(job_id)
+        try:
+            return load_estimate(path, self.record(job_id) or {})
+        except UNREADABLE as error:
+            raise InputError(f"{path} cannot be read ({_why(error)}); run the same command again") from error
 
     @contextmanager
     def work_folder(self) -> Iterator[Path]:
         """A folder for a job in progress, on the same file system; removed afterwards."""
         parent = self.folder / "work"
-        parent.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(dir=parent))
+        with _writing(parent):
+            self._make(parent)
+            work = Path(tempfile.mkdtemp(prefix=f"{socket.gethostname()}.{os.getpid()}.", dir=parent))
         try:
             yield work
         finally:
             shutil.rmtree(work, ignore_errors=True)
 
-    def _record_path(self, job_id: str) -> Path:
-        return self.folder / "records" / f"{job_id}.json"
+    def sweep(self) -> None:
+        """Remove what processes of this machine that are gone have left in ``work``."""
+        import psutil
 
-    def _estimate_path(self, job_id: str) -> Path:
-        return self.folder / "estimates" / f"{job_id}.npz"
+        for path in (self.folder / "work").glob(f"{socket.gethostname()}.*.*"):
+            pid = path.name.rsplit(".", 2)[1]
+            if pid.isdecimal() and not psutil.pid_exists(int(pid)):
+                shutil.rmtree(path, ignore_errors=True)
+
+    def record_path(self, job_id: str) -> Path:
+        """File of a job's record."""
+        return self.folder / "records" / job_id[:2] / f"{job_id}.json"
+
+    def estimate_path(self, job_id: str) -> Path:
+        """File of a job's estimate."""
+        return self.folder / "estimates" / job_id[:2] / f"{job_id}.npz"
+
+    def _make(self, folder: Path) -> None:
+        if folder not in self._made:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._made.add(folder)
+
+    def _write_json(self, path: Path, content: Mapping[str, Any], indent: int | None = 1) -> None:
+        with _writing(path):
+            self._make(path.parent)
+            write_json(path, content, indent)
 
 
-def _write_json(path: Path, content: Mapping[str, Any]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
-    temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
-    temporary.replace(path)
+def write_json(path: Path, content: Mapping[str, Any], indent: int | None = 1) -> None:
+    """Write a file by rename, so that a reader finds it whole or not at all."""
+    temporary = path.with_name(f"{path.name}.{socket.gethostname()}.{os.getpid()}.part")
+    try:
+        temporary.write_text(json.dumps(content, indent=indent), encoding="utf-8")
+        temporary.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be written ({_why(error)}); what is finished is kept, and the same command continues"
+        ) from error
 
 
 def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{path} cannot be read ({error}); delete it and run again") from error
+    content = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(content, dict):
-        raise InputError(f"{path} does not hold a record; delete it and run again")
+        raise ValueError("not a JSON object")
     return content
+
+
+def _why(error: BaseException) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return f"{type(error).__name__}: {error}".removesuffix(": ")

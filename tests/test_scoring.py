@@ -6,7 +6,8 @@ from bench.errors import InputError
 from bench.problem import Problem
 from bench.scoring.alignment import RULES, align
 from bench.scoring.errors import camera_errors, edge_metrics, summary
-from bench.scoring.statistics import confidence_interval, seed_half_width, tie_groups
+from bench.scoring.seed_ties import tied_by_seed
+from bench.scoring.statistics import confidence_interval, seed_half_width, tie_groups, tied
 
 
 @pytest.fixture
@@ -280,3 +281,34 @@ class TestIntervals:
     def test_half_width_over_seeds(self):
         assert seed_half_width([1, 2, 3]) == pytest.approx(4.302653 / np.sqrt(3))
         assert np.isnan(seed_half_width([1, np.nan]))
+
+
+def test_a_method_that_ran_once_ties_with_one_that_ran_under_every_seed() -> None:
+    """On one instance a deterministic method has one seed, and must not drop out of the comparison for that."""
+    errors = np.random.default_rng(0).uniform(1, 2, 60)
+    once, often, worse = ("once", ""), ("often", ""), ("worse", "")
+    by_method = {once: [errors], often: [errors * 1.001, errors, errors * 0.999], worse: [errors * 2]}
+    assert tied(by_method, same_cameras=True) == {once, often}
+
+
+def test_with_many_seeds_the_seeds_alone_tell_who_ties(rng):
+    """Twins tie, five per cent more does not, and a method that skips the hard seeds does not compete."""
+    hard = rng.lognormal(0, 1, 500)
+
+    def rows(factor, spread=0.2):
+        medians = factor * hard * rng.lognormal(0, spread, 500)
+        return np.stack([np.arange(500), medians, 1.5 * medians, np.full(500, 20)], axis=1)
+
+    easy = rows(0.5)
+    easy[hard > np.quantile(hard, 0.9), 1:] = np.nan, np.nan, 0
+    found = tied_by_seed({"one": rows(1.0), "twin": rows(1.0), "worse": rows(1.05), "easy": easy})
+    assert found == {"one", "twin"}
+
+
+def test_with_many_seeds_false_alarms_are_rare(rng):
+    alarms = 0
+    for _ in range(100):
+        draws = np.exp(rng.normal(size=(4, 300)))
+        rows = {k: np.stack([np.arange(300), d, d, np.ones(300)], axis=1) for k, d in enumerate(draws)}
+        alarms += len(tied_by_seed(rows)) < 4
+    assert alarms <= 10

@@ -85,7 +85,7 @@ def test_an_instance_is_timed_again_as_a_whole(
     run = planned(faulty_plugin, tmp_path)
     finish(run)
     assert planned(faulty_plugin, tmp_path).todo == []
-    (tmp_path / "records" / f"{run.cells[1].job.id}.json").unlink()
+    run.store.record_path(run.cells[1].job.id).unlink()
     assert [cell.job.id for cell in planned(faulty_plugin, tmp_path).todo] == [c.job.id for c in run.cells[:3]]
     assert len(planned(faulty_plugin, tmp_path, rounds=4).todo) == 6
 

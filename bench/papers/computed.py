@@ -6,9 +6,9 @@ from typing import Any
 
 from bench import registry, selection
 from bench.errors import InputError
+from bench.plan import Job
 from bench.problem import Instance
 from bench.results import Results
-from bench.store import Job
 
 
 @dataclass(frozen=True)

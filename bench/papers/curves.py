@@ -9,11 +9,11 @@ import numpy as np
 from bench.execution import outcome
 from bench.experiment import Suite
 from bench.papers.computed import Computed, extended, label, one, spelled
+from bench.plan import Job
 from bench.problem import Floats
 from bench.registry import catalog
 from bench.scoring.statistics import seed_half_width
 from bench.scoring.theory import cramer_rao_rms_deg
-from bench.store import Job
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -194,7 +194,7 @@ def _first(rows: pd.DataFrame, column: str) -> float:
 
 
 def _numbers(column: pd.Series) -> list[float]:
-    return [float(value) for value in pd.to_numeric(column, errors="coerce").dropna()]
+    return pd.to_numeric(column, errors="coerce").dropna().astype(float).tolist()
 
 
 def _mean(numbers: list[float]) -> float:

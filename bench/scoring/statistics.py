@@ -64,7 +64,8 @@ def seed_half_width(values: Sequence[float], level: float = 0.95) -> float:
     """Half-width of Student's t interval of the mean over seeds; NaN for fewer than two seeds."""
     from scipy.special import stdtrit
 
-    finite = np.array([v for v in values if np.isfinite(v)])
+    finite = np.asarray(values, dtype=float)
+    finite = finite[np.isfinite(finite)]
     if len(finite) < 2:
         return float("nan")
     quantile = float(stdtrit(len(finite) - 1, 0.5 + level / 2))
@@ -126,6 +127,24 @@ def tie_groups(
     best = int(np.argmin(np.nanmean(_scores(table, centres[0]), axis=1)))
     apart = np.any([_told_apart(table, best, c, same_cameras, level / len(centres)) for c in centres], axis=0)
     return {key for key, told in zip(competing, apart, strict=True) if not told}
+
+
+def tied(by_method: Mapping[Key, Sequence[Floats]], *, same_cameras: bool) -> set[Key]:
+    """`tie_groups` of errors (n,), one array for each seed of each method.
+
+    On one instance a deterministic method ran once, and would have done the same under every seed.
+    """
+    seeds = max(map(len, by_method.values()))
+    repeated = {m: list(e) * (seeds if same_cameras and len(e) == 1 else 1) for m, e in by_method.items()}
+    return tie_groups({m: _padded(errors) for m, errors in repeated.items()}, same_cameras=same_cameras)
+
+
+def _padded(errors: Sequence[Floats]) -> Floats:
+    """(seeds, cameras), with NaN where the instances of the seeds differ in size."""
+    out = np.full((len(errors), max(map(len, errors))), np.nan)
+    for row, e in zip(out, errors, strict=True):
+        row[: len(e)] = e
+    return out
 
 
 def _told_apart(table: Floats, best: int, centre: Centre, same_cameras: bool, level: float) -> NDArray[np.bool_]:

@@ -1,0 +1,77 @@
+"""Fill a run's folder with records as a sweep would, to time what reads them.
+
+    python -m tests.generate_records FOLDER 1000000
+    time python -m bench table FOLDER
+
+Truths, measurements and estimates are random and small (ten cameras in a ring); every instance, record and estimate
+goes through the store like that of a real run.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from bench import so3
+from bench.arrays import save_estimate
+from bench.plan import Job, Plan
+from bench.problem import Estimate, Instance, Problem
+from bench.store import Store, digest
+
+CAMERAS, DATASETS, METHODS = 10, 10, 10
+
+
+def generate(folder: Path, count: int) -> None:
+    """Write `count` jobs of 10 datasets x 10 methods x seeds, one in a hundred of which ended in a timeout."""
+    store = Store(folder)
+    rng = np.random.default_rng(0)
+    jobs = []
+    for k in range(count // METHODS):
+        seed, dataset = divmod(k, DATASETS)
+        key = digest([dataset, seed])
+        truth = so3.random(rng, CAMERAS)
+        store.add_instance(key, ring(truth, rng, f"ring{dataset}"))
+        for method in range(METHODS):
+            job = Job(
+                digest([key, method]), f"ring[noise_deg={dataset}]", f"ring{dataset}", key, f"method-{method}",
+                f"Method {method}", "bench.methods.spectral", {"step": method}, seed,
+            )  # fmt: skip
+            jobs.append(job)
+            add_record(store, job, truth, rng, failed=rng.random() < 0.01)
+    store.add_plan(Plan("generated", tuple(jobs), command="generated"))
+
+
+def ring(truth: np.ndarray, rng: np.random.Generator, name: str) -> Instance:
+    """Neighbours in a ring, and the cameras across."""
+    i = np.repeat(np.arange(CAMERAS), 2)
+    j = (i + np.tile([1, 3], CAMERAS)) % CAMERAS
+    edges = np.stack([np.minimum(i, j), np.maximum(i, j)], axis=1)
+    i, j = edges.T
+    noise = so3.exp(0.02 * rng.normal(size=(len(edges), 3)))
+    return Instance(Problem(CAMERAS, edges, noise @ truth[i] @ truth[j].transpose(0, 2, 1)), truth, name)
+
+
+def add_record(store: Store, job: Job, truth: np.ndarray, rng: np.random.Generator, *, failed: bool) -> None:
+    """Keep a record of realistic size, and an estimate a few degrees from the truth."""
+    record = {
+        "job": {name: getattr(job, name) for name in Job.__slots__},
+        "outcome": "timeout" if failed else "ok",
+        "status": "timeout(60 s)" if failed else "ok",
+        "finished": "2026-01-01T00:00:00+00:00",
+        "limits": {"seconds": 60.0, "memory_gib": 8.0},
+        "versions": {"numpy": "2.0", "scipy": "1.13"},
+        "provenance": {"command": "python -m bench run", "cpu": 40 * "x", "platform": 60 * "x", "git": 40 * "0"},
+        "wall_s": 0.02,
+    }
+    if failed:
+        store.add_record(job.id, record, None)
+        return
+    noise = so3.exp(0.002 * (1 + job.parameters["step"]) * rng.normal(size=(CAMERAS, 3)))
+    with store.work_folder() as work:
+        save_estimate(work / "estimate.npz", Estimate(noise @ truth))
+        record |= {"solve_s": 0.001 * rng.lognormal(), "peak_mib": 1.5, "threads": 1, "iterations": 12, "notes": []}
+        store.add_record(job.id, record, work / "estimate.npz")
+
+
+if __name__ == "__main__":
+    generate(Path(sys.argv[1]), int(sys.argv[2]))
