@@ -140,7 +140,7 @@ class _Scorer:
         """Score a job, or say that it has no record; raises `InputError` where its record cannot be read."""
         self.used = True
         record = (self.store.record(job.id) if stamp >= 0 else None) or NOT_RUN
-        estimate = self.store.estimate(job.id) if record["outcome"] == outcome.OK else None
+        estimate = self.store.estimate(job.id, record) if record["outcome"] == outcome.OK else None
         instance = self.instance(job.instance_key)
         try:
             row, errors = scored(instance, record, estimate, self.rule)

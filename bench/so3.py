@@ -152,29 +152,43 @@ def geodesic_median(r: Array) -> Array:
     """
     members = r[np.unique(np.linspace(0, len(r) - 1, MEDIAN_STARTS).astype(int))]
     starts = np.concatenate([project(_geometric_median(r))[None], members])
-    median: Array = starts[np.argmin(angle_between(starts[:, None], r).sum(axis=1))]
+    median = to_quaternion(starts[np.argmin(angle_between(starts[:, None], r).sum(axis=1))])
+    q = to_quaternion(r)
     for _ in range(MEAN_ITERATIONS):
-        tangent = log(r @ median.T)
-        distance = np.linalg.norm(tangent, axis=-1)
+        relative = q @ _right_product(median * _CONJUGATE)
+        sine = np.linalg.norm(relative[:, 1:], axis=1)
+        distance = 2 * np.arctan2(sine, np.abs(relative[:, 0]))
         met = distance < MEAN_TOLERANCE
         weight = np.divide(1, distance, out=np.zeros_like(distance), where=~met)
-        pull = weight @ tangent
-        excess = np.linalg.norm(pull) - met.sum()
+        unit = np.divide(np.copysign(1, relative[:, 0]), sine, out=np.zeros_like(sine), where=~met)
+        pull = unit @ relative[:, 1:]
+        length = np.linalg.norm(pull)
+        excess = length - met.sum()
         if excess <= 0:
             break
-        step = excess / np.linalg.norm(pull) * pull / weight.sum()
-        median = exp(step) @ median
-        if np.linalg.norm(step) < MEAN_TOLERANCE:
+        step = excess / weight.sum()
+        median = np.append(np.cos(step / 2), np.sin(step / 2) / length * pull) @ _right_product(median)
+        if step < MEAN_TOLERANCE:
             break
-    return median
+    return from_quaternion(median)
+
+
+_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def _right_product(q: Array) -> Array:
+    """Matrix (4, 4) with p @ it the Hamilton product p q of quaternions."""
+    w, x, y, z = q
+    return np.array([[w, x, y, z], [-x, w, -z, y], [-y, z, w, -x], [-z, -y, x, w]])
 
 
 def _geometric_median(r: Array) -> Array:
     """Matrix (3, 3) that minimises the sum of Frobenius distances to r (k, 3, 3), to 1e-6 (Weiszfeld)."""
-    center: Array = r.mean(axis=0)
+    entries = r.reshape(len(r), 9)
+    center: Array = entries.mean(axis=0)
     for _ in range(MEAN_ITERATIONS):
-        weight = 1 / np.maximum(np.linalg.norm(r - center, axis=(1, 2)), MEAN_TOLERANCE)
-        previous, center = center, np.average(r, axis=0, weights=weight)
+        weight = 1 / np.maximum(np.linalg.norm(entries - center, axis=1), MEAN_TOLERANCE)
+        previous, center = center, weight @ entries / weight.sum()
         if np.linalg.norm(center - previous) < 1e-6:
             break
-    return center
+    return center.reshape(3, 3)

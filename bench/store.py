@@ -164,13 +164,13 @@ class Store:
             with _writing(final):
                 self._make(final.parent)
                 estimate.replace(final)
-        self._write_json(self.record_path(job_id), {**record, "schema": migration.SCHEMA})
+        self._write_json(self.record_path(job_id), {**record, "schema": migration.SCHEMA}, indent=None)
 
-    def estimate(self, job_id: str) -> Estimate:
+    def estimate(self, job_id: str, record: Mapping[str, Any] | None = None) -> Estimate:
         """Estimate of a job whose outcome is ``ok``; raises `InputError` where it cannot be read."""
         path = self.estimate_path(job_id)
         try:
-            return load_estimate(path, self.record(job_id) or {})
+            return load_estimate(path, dict(record or self.record(job_id) or {}))
         except UNREADABLE as error:
             raise InputError(f"{path} cannot be read ({_why(error)}); run the same command again") from error
 

@@ -3,8 +3,8 @@
     python -m tests.generate_records FOLDER 1000000
     time python -m bench table FOLDER
 
-Truths, measurements and estimates are random and small (ten cameras in a ring); every instance, record and estimate
-goes through the store like that of a real run.
+Truths, measurements and estimates are random and small (five cameras, all connected); every instance,
+record and estimate goes through the store like that of a real run.
 """
 
 import sys
@@ -18,7 +18,7 @@ from bench.plan import Job, Plan
 from bench.problem import Estimate, Instance, Problem
 from bench.store import Store, digest
 
-CAMERAS, DATASETS, METHODS = 10, 10, 10
+CAMERAS, DATASETS, METHODS = 5, 10, 10
 
 
 def generate(folder: Path, count: int) -> None:
@@ -26,32 +26,31 @@ def generate(folder: Path, count: int) -> None:
     store = Store(folder)
     rng = np.random.default_rng(0)
     jobs = []
-    for k in range(count // METHODS):
-        seed, dataset = divmod(k, DATASETS)
-        key = digest([dataset, seed])
-        truth = so3.random(rng, CAMERAS)
-        store.add_instance(key, ring(truth, rng, f"ring{dataset}"))
-        for method in range(METHODS):
-            job = Job(
-                digest([key, method]), f"ring[noise_deg={dataset}]", f"ring{dataset}", key, f"method-{method}",
-                f"Method {method}", "bench.methods.spectral", {"step": method}, seed,
-            )  # fmt: skip
-            jobs.append(job)
-            add_record(store, job, truth, rng, failed=rng.random() < 0.01)
+    with store.work_folder() as work:
+        for k in range(count // METHODS):
+            seed, dataset = divmod(k, DATASETS)
+            key = digest([dataset, seed])
+            truth = so3.random(rng, CAMERAS)
+            store.add_instance(key, complete(truth, rng, f"complete{dataset}"))
+            for method in range(METHODS):
+                names = (f"method-{method}", f"Method {method}", "bench.methods.spectral", {"step": method})
+                job = Job(digest([key, method]), f"complete[k={dataset}]", f"complete{dataset}", key, *names, seed)
+                jobs.append(job)
+                add_record(store, job, truth, rng, work, failed=rng.random() < 0.01)
     store.add_plan(Plan("generated", tuple(jobs), command="generated"))
 
 
-def ring(truth: np.ndarray, rng: np.random.Generator, name: str) -> Instance:
-    """Neighbours in a ring, and the cameras across."""
-    i = np.repeat(np.arange(CAMERAS), 2)
-    j = (i + np.tile([1, 3], CAMERAS)) % CAMERAS
-    edges = np.stack([np.minimum(i, j), np.maximum(i, j)], axis=1)
-    i, j = edges.T
-    noise = so3.exp(0.02 * rng.normal(size=(len(edges), 3)))
+def complete(truth: np.ndarray, rng: np.random.Generator, name: str) -> Instance:
+    """Every pair of cameras, measured within a degree or two."""
+    i, j = np.triu_indices(CAMERAS, k=1)
+    noise = so3.exp(0.02 * rng.normal(size=(len(i), 3)))
+    edges = np.stack([i, j], axis=1)
     return Instance(Problem(CAMERAS, edges, noise @ truth[i] @ truth[j].transpose(0, 2, 1)), truth, name)
 
 
-def add_record(store: Store, job: Job, truth: np.ndarray, rng: np.random.Generator, *, failed: bool) -> None:
+def add_record(
+    store: Store, job: Job, truth: np.ndarray, rng: np.random.Generator, work: Path, *, failed: bool
+) -> None:
     """Keep a record of realistic size, and an estimate a few degrees from the truth."""
     record = {
         "job": {name: getattr(job, name) for name in Job.__slots__},
@@ -67,10 +66,9 @@ def add_record(store: Store, job: Job, truth: np.ndarray, rng: np.random.Generat
         store.add_record(job.id, record, None)
         return
     noise = so3.exp(0.002 * (1 + job.parameters["step"]) * rng.normal(size=(CAMERAS, 3)))
-    with store.work_folder() as work:
-        save_estimate(work / "estimate.npz", Estimate(noise @ truth))
-        record |= {"solve_s": 0.001 * rng.lognormal(), "peak_mib": 1.5, "threads": 1, "iterations": 12, "notes": []}
-        store.add_record(job.id, record, work / "estimate.npz")
+    save_estimate(work / "estimate.npz", Estimate(noise @ truth))
+    record |= {"solve_s": 0.001 * rng.lognormal(), "peak_mib": 1.5, "threads": 1, "iterations": 12, "notes": []}
+    store.add_record(job.id, record, work / "estimate.npz")
 
 
 if __name__ == "__main__":
