@@ -1,11 +1,20 @@
 """Problems and estimates as ``.npz`` files, float64 and unrounded, read without pickle."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bench.problem import Checkpoint, Estimate, Problem
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """The arrays in an ``.npz``; numpy alone leaves the file open where it is damaged."""
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+        yield data
 
 
 def save_problem(path: Path, problem: Problem) -> None:
@@ -19,7 +28,7 @@ def save_problem(path: Path, problem: Problem) -> None:
 
 def load_problem(path: Path) -> Problem:
     """Read what `save_problem` wrote."""
-    with np.load(path, allow_pickle=False) as data:
+    with opened(path) as data:
         weights = data.get("weights", None)
         return Problem(int(data["n"]), data["edges"], data["rotations"], weights)
 
@@ -37,7 +46,7 @@ def save_estimate(path: Path, estimate: Estimate) -> None:
 
 def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
     """Read what `save_estimate` wrote, with the scalars that the record holds."""
-    with np.load(path, allow_pickle=False) as data:
+    with opened(path) as data:
         states = data.get("checkpoints", ())
         return Estimate(
             rotations=data["rotations"],

@@ -141,10 +141,11 @@ class Run:
         self.store.sweep()
         for sentence in self.unreadable:
             tell(sentence.replace("run the same command again", "its job is run again"))
-        for cell in self.cells:
-            if not self.store.problem_path(cell.job.instance_key).exists():
+        needed = {cell.job.instance_key for cell in self.todo}
+        for key, cell in {cell.job.instance_key: cell for cell in self.cells}.items():
+            if not (self.store.has_instance(key) if key in needed else self.store.problem_path(key).exists()):
                 tell(f"loading {cell.job.dataset} {cell.job.instance}")
-                self.store.add_instance(cell.job.instance_key, cell.source.load())
+                self.store.add_instance(key, cell.source.load())
         command = shlex.join(["python", "-m", "bench", *sys.argv[1:]])
         jobs = tuple(cell.job for cell in self.cells)
         baseline = self.baseline if self.options.timing else ""

@@ -31,11 +31,12 @@ from typing import Any
 import numpy as np
 
 from bench import migration
-from bench.arrays import load_estimate, load_problem, save_problem
+from bench.arrays import load_estimate, load_problem, opened, save_problem
 from bench.errors import InputError
 from bench.plan import Job, Plan, decode, encode, newest
 from bench.problem import Estimate, Instance
 
+ASIDE = "damaged"  # where what cannot be read is moved
 UNREADABLE = (OSError, EOFError, ValueError, KeyError, TypeError, IndexError, AttributeError, zipfile.BadZipFile)
 
 
@@ -72,11 +73,15 @@ class Store:
 
     def add_plan(self, plan: Plan) -> None:
         """Keep a plan."""
-        if not (self.folder / migration.FILE).exists():
-            self._write_json(self.folder / migration.FILE, {"schema": migration.SCHEMA})
+        self.mark()
         content = encode(plan) | {"schema": migration.SCHEMA}
         moment = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%f")
         self._write_json(self.folder / "plans" / f"{moment}-{digest(content)[:8]}.json", content, indent=None)
+
+    def mark(self) -> None:
+        """Write the version of the layout, before the first plan."""
+        if not (self.folder / migration.FILE).exists():
+            self._write_json(self.folder / migration.FILE, {"schema": migration.SCHEMA})
 
     def plans(self) -> list[Plan]:
         """Every plan, oldest first.
@@ -121,6 +126,20 @@ class Store:
                 if not final.exists():
                     raise
 
+    def has_instance(self, key: str) -> bool:
+        """Whether an instance is there; one that cannot be read is put aside, as if it were not."""
+        folder = self.folder / "instances" / key
+        if not folder.exists():
+            return False
+        try:
+            self.instance(key)
+        except InputError:
+            with _writing(self.folder / ASIDE):
+                self._make(self.folder / ASIDE)
+                folder.rename(tempfile.mkdtemp(prefix=f"{key}-", dir=self.folder / ASIDE))
+            return False
+        return True
+
     def problem_path(self, key: str) -> Path:
         """File of an instance's problem."""
         return self.folder / "instances" / key / "problem.npz"
@@ -129,14 +148,17 @@ class Store:
         """Read an instance back; raises `InputError` where that fails."""
         folder = self.folder / "instances" / key
         try:
-            with np.load(folder / "truth.npz", allow_pickle=False) as data:
+            with opened(folder / "truth.npz") as data:
                 truth = data.get("truth", None)
                 outliers = data.get("outliers", None)
             facts = _read_json(folder / "instance.json")
             facts["notes"] = tuple(facts["notes"])
             return Instance(load_problem(folder / "problem.npz"), truth, outliers=outliers, **facts)
         except UNREADABLE as error:
-            raise InputError(f"{folder} cannot be read ({_why(error)}); delete it and run again") from error
+            raise InputError(
+                f"{folder} cannot be read ({_why(error)}); run the same command again, or see: "
+                f"python -m bench doctor {self.folder} --repair"
+            ) from error
 
     def record(self, job_id: str) -> dict[str, Any] | None:
         """Record of a job, or None where there is none.
@@ -186,14 +208,28 @@ class Store:
         finally:
             shutil.rmtree(work, ignore_errors=True)
 
-    def sweep(self) -> None:
-        """Remove what processes of this machine that are gone have left in ``work``."""
+    def abandoned(self) -> list[Path]:
+        """Folders in ``work`` whose process, on this machine, is gone."""
         import psutil
 
+        found = []
         for path in (self.folder / "work").glob(f"{socket.gethostname()}.*.*"):
             pid = path.name.rsplit(".", 2)[1]
             if pid.isdecimal() and not psutil.pid_exists(int(pid)):
-                shutil.rmtree(path, ignore_errors=True)
+                found.append(path)
+        return found
+
+    def sweep(self) -> None:
+        """Remove what processes that are gone have left in ``work``."""
+        for path in self.abandoned():
+            shutil.rmtree(path, ignore_errors=True)
+
+    def copy_in(self, source: Path, final: Path) -> None:
+        """Copy a file of another run to its place in this one, by rename and with its times."""
+        with _writing(final), self.work_folder() as work:
+            shutil.copy2(source, work / final.name)
+            self._make(final.parent)
+            (work / final.name).replace(final)
 
     def record_path(self, job_id: str) -> Path:
         """File of a job's record."""

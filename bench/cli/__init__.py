@@ -3,11 +3,14 @@
 Nothing heavy is imported before a verb runs, so that ``--help`` answers at once.
 """
 
+import errno
 import sys
 
 import typer
 
-from bench.cli import check, data, list_, new, paper, plot, run, solve, table
+from bench.cli import check, data, doctor, list_, merge, new, paper, plot, run, solve, table
+
+REFUSED = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 app = typer.Typer(
     name="bench",
@@ -21,6 +24,8 @@ app.command("list")(list_.list_)
 app.command("table")(table.table)
 app.command("plot")(plot.plot)
 app.command("paper")(paper.paper)
+app.command("merge")(merge.merge)
+app.command("doctor")(doctor.doctor)
 app.add_typer(data.app, name="data")
 app.command("solve")(solve.solve)
 app.command("new")(new.new)
@@ -28,11 +33,16 @@ app.command("check")(check.check)
 
 
 def main() -> None:
-    """Run the command line; bad input is one sentence and exit code 2."""
+    """Run the command line; bad input, or a disk that takes no more, is one sentence and exit code 2."""
     from bench.errors import InputError
 
     try:
         app(prog_name="python -m bench")
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
+    except OSError as error:
+        if error.errno not in REFUSED:
+            raise
+        print(f"error: {error.filename or 'output'}: {error.strerror}; what is finished is kept", file=sys.stderr)
         sys.exit(2)

@@ -1,0 +1,241 @@
+"""Whatever happens to the folder of a run: nothing finished is lost, nothing is counted twice, damage is named."""
+
+import contextlib
+import json
+import shutil
+import socket
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import bench
+from conftest import FAULTY
+
+from bench import migration
+from bench.doctor import examine, repair
+from bench.errors import InputError
+from bench.merge import merge
+from bench.plan import Job, Plan, decode, encode
+from bench.results import score
+from bench.runner import Options, Run
+from bench.scores import scores_of
+from bench.store import Store
+
+METHODS = ["faulty[fault=[fine,random,raise]]"]
+
+
+def planned(plugin: Path, out: Path, methods: list[str] | None = None, **options: object) -> Run:
+    settings = {"out": out, "plugins": (plugin,), "timeout_s": 30.0, "jobs": 2} | options
+    return Run("quick", methods or METHODS, ["toy[n=[3,4]]"], Options(**settings))  # type: ignore[arg-type]
+
+
+def finish(store: Store) -> list[str]:
+    run.prepare()
+    return [record["status"] for _, record in run.execute()]
+
+
+def table(folder: Path) -> list[dict[str, object]]:
+    """What a table shows, times and memory apart."""
+    frame = score(Store.open(folder)).frame
+    return frame.drop(columns=["solve_s", "peak_mib"]).replace({np.nan: None}).to_dict("records")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a run that ended; not to be written to."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "faulty.py").write_text(FAULTY, encoding="utf-8")
+    finish(planned(folder / "faulty.py", folder / "run"))
+    return folder / "run"
+
+
+@pytest.fixture
+def store(finished: Path, tmp_path: Path) -> Store:
+    """A copy of it."""
+    return Store.open(Path(shutil.copytree(finished, tmp_path / "run")))
+
+
+def test_a_plan_survives_its_file() -> None:
+    jobs = tuple(
+        Job(f"{k:024x}", "toy[n=3]", "toy3", f"{k % 2:024x}", "m", "M", "file.py", {"a": [1, k % 3]}, k, 0)
+        for k in range(7)
+    )
+    plan = Plan("quick", jobs, ("one is missing",), "python -m bench run", "m")
+    assert decode(json.loads(json.dumps(encode(plan)))) == plan
+
+
+@pytest.mark.parametrize("key", ["../../outside", "", "a/b", "a\\b"])
+def test_a_plan_cannot_lead_out_of_its_folder(key: str) -> None:
+    content = encode(Plan("quick", (Job("0", "toy", "toy3", "0", "m", "M", "file.py", {}, 0),)))
+    with pytest.raises(ValueError, match="letters and digits"):
+        decode(content | {"jobs": content["jobs"] | {"id": [key]}})
+    with pytest.raises(ValueError, match="letters and digits"):
+        decode(content | {"instances": [["toy", "toy3", key]]})
+
+
+def test_a_folder_of_the_first_layout_is_brought_up_to_date(store: Store, tmp_path: Path) -> None:
+    whole = table(store.folder)
+    old = tmp_path / "old"
+    shutil.copytree(store.folder, old)
+    for path in [*old.glob("records/*/*.json"), *old.glob("estimates/*/*.npz")]:
+        path.rename(path.parent.parent / path.name)
+    (path,) = old.glob("plans/*.json")
+    spelled_out = [{name: getattr(job, name) for name in Job.__slots__} for job in Store(old).plans()[0].jobs]
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"schema": 1, "jobs": spelled_out}))
+    (old / migration.FILE).unlink()
+    shutil.rmtree(old / "scores")
+
+    assert table(old) == whole
+    assert examine(old) == []
+
+
+def test_a_folder_of_a_newer_version_is_refused(store: Store) -> None:
+    (store.folder / migration.FILE).write_text('{"schema": 99}')
+    with pytest.raises(InputError, match=r"has layout 99.*upgrade"):
+        Store.open(store.folder)
+
+
+def test_scores_are_computed_once(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = score(store)
+    monkeypatch.setattr(Store, "record", None)  # nothing is read again
+    again = score(store)
+    assert again.frame.equals(first.frame)
+    for place, by_method in first.errors.items():
+        for method, errors in by_method.items():
+            np.testing.assert_array_equal(errors, again.errors[place][method])
+
+
+def test_a_record_that_changed_is_scored_again(store: Store) -> None:
+    job = next(job for job in store.jobs() if job.parameters["fault"] == "random")
+    before = scores_of(store, [job], "l1").table["max_deg"][0].as_py()
+    truth = store.instance(job.instance_key).truth
+    assert truth is not None
+    path = store.estimate_path(job.id)
+    np.savez(path, rotations=truth)
+    record = store.record(job.id)
+    assert record is not None
+    store.add_record(job.id, record, None)
+    after = scores_of(store, [job], "l1").table["max_deg"][0].as_py()
+    assert before > 1
+    assert after < 1e-6
+
+
+def test_scores_that_cannot_be_kept_or_read_are_computed_again(store: Store) -> None:
+    whole = table(store.folder)
+    for path in store.folder.glob("scores/*/*.parquet"):
+        path.write_bytes(b"PAR1 and nothing more")
+    assert table(store.folder) == whole
+    shutil.rmtree(store.folder / "scores")
+    (store.folder / "scores").write_text("in the way")
+    assert table(store.folder) == whole
+
+
+def test_two_halves_merge_to_the_whole(faulty_plugin: Path, store: Store, tmp_path: Path) -> None:
+    finish(planned(faulty_plugin, tmp_path / "one", ["faulty[fault=[fine,random]]"]))
+    finish(planned(faulty_plugin, tmp_path / "other", ["faulty[fault=[random,raise]]"]))
+    done = merge([tmp_path / "one", tmp_path / "other"], tmp_path / "both")
+    assert (done.added, done.replaced, done.kept, done.told) == (6, 0, 2, [])
+    assert sorted(map(str, table(tmp_path / "both"))) == sorted(map(str, table(store.folder)))
+    assert examine(tmp_path / "both") == []
+    assert planned(faulty_plugin, tmp_path / "both").todo == []
+    again = merge([tmp_path / "one"], tmp_path / "both")
+    assert (again.added, again.replaced, again.kept) == (0, 0, 4)
+    assert len(list((tmp_path / "both" / "plans").iterdir())) == 2
+
+
+def test_a_merge_prefers_what_ended_well_and_tells_what_differs_or_cannot_be_read(store: Store, tmp_path: Path) -> None:
+    one, other = store, Store(tmp_path / "other")
+    shutil.copytree(one.folder, other.folder)
+    fine, random, *_ = (job.id for job in one.jobs())
+    worse = {"outcome": "timeout", "status": "timeout(1 s)", "finished": "2999-01-01"}
+    one.add_record(fine, (one.record(fine) or {}) | worse, None)
+    np.savez(other.estimate_path(random), rotations=np.tile(np.eye(3), (3, 1, 1)))
+    raised = next(job.id for job in one.jobs() if job.parameters["fault"] == "raise")
+    other.record_path(raised).write_text("{")
+
+    done = merge([other.folder], one.folder)
+    assert done.replaced == 1
+    assert (one.record(fine) or {})["outcome"] == "ok"
+    assert any(f"the estimates of job {random} differ" in sentence for sentence in done.told)
+    assert any(f"{raised}.json cannot be read" in sentence for sentence in done.told)
+    assert (one.record(raised) or {})["outcome"] == "error"
+
+
+def test_ordinary_and_timing_runs_are_not_merged(faulty_plugin: Path, store: Store, tmp_path: Path) -> None:
+    planned(faulty_plugin, tmp_path / "timed", timing=True).prepare()
+    with pytest.raises(InputError, match="cannot be merged"):
+        merge([store.folder, tmp_path / "timed"], tmp_path / "both")
+
+
+def test_damage_is_found_repaired_and_run_again(faulty_plugin: Path, store: Store) -> None:
+    folder, whole = store.folder, table(store.folder)
+    jobs = [job for job in store.jobs() if job.parameters["fault"] != "raise"]
+    cut, torn, gone, _ = (job.id for job in jobs)
+    store.record_path(cut).write_text(store.record_path(cut).read_text()[:100])
+    store.estimate_path(torn).write_bytes(store.estimate_path(torn).read_bytes()[:-300])
+    store.estimate_path(gone).unlink()
+    instance = folder / "instances" / jobs[0].instance_key / "truth.npz"
+    instance.write_bytes(b"")
+    (folder / "work" / f"{socket.gethostname()}.999999999.abc").mkdir(parents=True)
+    (folder / "plans" / "x.json.host.1.part").write_text("{")
+    (folder / "plans" / "29990101T000000.000000-0.json").write_text("[]")
+
+    findings = examine(folder)
+    assert sorted(f.remedy for f in findings) == ["aside"] * 5 + ["remove"] * 2
+    bench("doctor", folder, code=1)
+    repair(folder, findings)
+    assert (folder / "damaged" / "records" / cut[:2] / f"{cut}.json").exists()
+    again = planned(faulty_plugin, folder)
+    assert {cell.job.id for cell in again.todo} == {cut, torn, gone}
+    finish(again)
+    assert table(folder) == whole
+    repair(folder, examine(folder))
+    assert "6 jobs planned (4 ok, 2 error)" in bench("doctor", folder).stdout
+
+
+def test_records_without_a_plan_are_given_one(store: Store) -> None:
+    whole = table(store.folder)
+    (path,) = store.folder.glob("plans/*.json")
+    path.write_text(path.read_text()[:-30])
+    with pytest.raises(InputError, match=r"cannot be read.*doctor .* --repair"):
+        score(store)
+    findings = examine(store.folder)
+    assert [f.remedy for f in findings] == ["aside", *["plan"] * len(whole)]
+    repair(store.folder, findings)
+    assert examine(store.folder) == []
+    assert sorted(map(str, table(store.folder))) == sorted(map(str, whole))
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    done = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", folder], capture_output=True)
+    if done.returncode:
+        pytest.skip("no file system can be mounted here")
+    yield folder
+    subprocess.run(["umount", folder], check=True)
+
+
+def test_a_full_disk_stops_the_run_and_loses_nothing(faulty_plugin: Path, finished: Path, small_disk: Path) -> None:
+    """Wherever it strikes, no job counts as failed for it, and the same command continues when there is room."""
+    filling, whole, finished = small_disk / "filling", table(finished), 0
+    for pages in (4, 9, 14, 19, 24):
+        folder = small_disk / str(pages)
+        filling.write_bytes(bytes(shutil.disk_usage(small_disk).free - 4096 * pages))
+        with contextlib.suppress(InputError):
+            finish(planned(faulty_plugin, folder, jobs=1))
+            finished += 1
+        filling.unlink()
+        finish(planned(faulty_plugin, folder))
+        assert table(folder) == whole
+        shutil.rmtree(folder)
+    assert finished < 4
+
+
+def test_a_full_disk_is_one_sentence(faulty_plugin: Path, small_disk: Path) -> None:
+    (small_disk / "filling").write_bytes(bytes(shutil.disk_usage(small_disk).free - 40960))
+    arguments = ("--plugin", faulty_plugin, "-m", "faulty", "-d", "toy", "--out", small_disk / "run")
+    assert "No space left on device" in bench("run", *arguments, code=2).stderr
