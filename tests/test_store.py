@@ -31,7 +31,7 @@ def planned(plugin: Path, out: Path, methods: list[str] | None = None, **options
     return Run("quick", methods or METHODS, ["toy[n=[3,4]]"], Options(**settings))  # type: ignore[arg-type]
 
 
-def finish(store: Store) -> list[str]:
+def finish(run: Run) -> list[str]:
     run.prepare()
     return [record["status"] for _, record in run.execute()]
 
