@@ -23,6 +23,7 @@ from bench import registry
 from bench.arrays import load_problem, save_estimate
 from bench.execution import outcome
 from bench.execution.outcome import Outcome
+from bench.execution.threads import pin_threads
 from bench.problem import ROTATION_TOLERANCE, Estimate, Floats, Problem, Skipped
 from bench.seeds import stream
 
@@ -99,7 +100,7 @@ def _solve(request: Request, result: dict[str, Any]) -> Outcome:
         raise Skipped(f"{problem.n} cameras, and {info.name} is meant for at most {limit}")
     for name in info.requires:
         importlib.import_module(name)
-    result["threads"] = _pin_threads(request.threads)
+    result["threads"] = pin_threads(request.threads)
     result["core"] = _pin_core(request.core)
     if request.warm_up and hasattr(method, "warm_up"):
         method.warm_up()
@@ -215,19 +216,6 @@ def _scalars(estimate: Estimate) -> dict[str, Any]:
             for c in estimate.checkpoints
         ],
     }
-
-
-def _pin_threads(threads: int) -> int:
-    """Pin every numerical library that is loaded, and return the largest number of threads that any still has."""
-    import threadpoolctl
-
-    threadpoolctl.threadpool_limits(threads)
-    counts = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
-    torch = sys.modules.get("torch")
-    if torch is not None:
-        torch.set_num_threads(threads)
-        counts.append(torch.get_num_threads())
-    return max(counts, default=threads)
 
 
 def _pin_core(core: int | None) -> int | None:
