@@ -6,6 +6,7 @@ the folder for its two results, ``estimate.npz`` and ``result.json`` (written la
 
 import copy
 import dataclasses
+import functools
 import importlib
 import json
 import os
@@ -69,13 +70,43 @@ class Request:
     warm_up: bool = True
 
 
-def run(request: Request) -> None:
-    """Run the job and write its results; whatever happens in Python becomes an outcome."""
+@dataclass(frozen=True)
+class Prepared:
+    """What a job needs besides what it is told: the plug-in, the configured method and the problem."""
+
+    info: registry.Info
+    method: Any
+    problem: Problem
+
+
+def prepare(request: Request) -> Prepared:
+    """Import the plug-in, configure the method and load the problem."""
+    module = registry.import_origin(request.origin)
+    info = next(info for info in registry.infos(module, "method") if info.name == request.method)
+    return Prepared(info, info.configure(request.parameters), _loaded(request.problem))
+
+
+@functools.lru_cache(maxsize=1)
+def _loaded(path: str) -> Problem:
+    """Load a problem; the last one is kept, since the jobs of one instance follow each other."""
+    problem = load_problem(Path(path))
+    _ = problem.components  # which every job asks for
+    return problem
+
+
+def run(request: Request, prepared: Prepared | None = None) -> None:
+    """Run the job and write its results; whatever happens in Python becomes an outcome.
+
+    Parameters
+    ----------
+    prepared
+        What `prepare` gave for this request, where that was called before.
+    """
     result: dict[str, Any] = {}
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            ended = _solve(request, result)
+            ended = _solve(request, prepared or prepare(request), result)
         result["warnings"] = sorted({f"{w.category.__name__}: {w.message}" for w in caught})
     except Skipped as skip:
         ended = Outcome(outcome.SKIPPED, str(skip))
@@ -90,11 +121,8 @@ def run(request: Request) -> None:
     temporary.replace(Path(request.folder, RESULT_FILE))
 
 
-def _solve(request: Request, result: dict[str, Any]) -> Outcome:
-    registry.import_origin(request.origin)
-    info = _info(request)
-    method = info.configure(request.parameters)
-    problem = load_problem(Path(request.problem))
+def _solve(request: Request, prepared: Prepared, result: dict[str, Any]) -> Outcome:
+    info, method, problem = prepared.info, prepared.method, prepared.problem
     limit = info.fact("max_cameras", method)
     if limit is not None and problem.n > limit:
         raise Skipped(f"{problem.n} cameras, and {info.name} is meant for at most {limit}")
@@ -151,11 +179,6 @@ def _repeated(method: Any, problem: Problem, request: Request, name: str) -> tup
         total += elapsed
         solves_s.append(elapsed - estimate.conversion_s)
     return solves_s, 1 - processor / total
-
-
-def _info(request: Request) -> registry.Info:
-    module = registry.import_origin(request.origin)
-    return next(info for info in registry.infos(module, "method") if info.name == request.method)
 
 
 def _what_is_wrong(problem: Problem, estimate: Estimate, elapsed: float) -> str:

@@ -25,13 +25,17 @@ import socket
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from bench.execution import processes
 from bench.execution.log import Tail
+
+if TYPE_CHECKING:
+    from bench.execution import child
 
 PRELOADED = (
     "bench.execution.child",
@@ -42,6 +46,7 @@ PRELOADED = (
 )
 SWEEP_S = 5.0  # at most, for what a job has left behind
 PIPE_BYTES = 65536
+LARGE_BYTES = 2**18  # of a problem that the server does not load: that takes more than a few milliseconds
 DRAIN = 16  # reads at most of what is left in the pipe of a job that has ended
 _SET_PARENT_DEATH_SIGNAL, _SET_CHILD_SUBREAPER = 1, 36  # of Linux's prctl
 
@@ -149,18 +154,20 @@ class _Server:
                 self._end(message["id"])
 
     def _fork(self, number: int, request: dict[str, Any]) -> None:
-        _import_plugin(request["origin"])
+        prepared = _prepared(request)
         read_end, write_end = os.pipe()
         pid = os.fork()
         if pid == 0:
-            self._be_the_child(request, read_end, write_end)
+            self._be_the_child(request, prepared, read_end, write_end)
         os.close(write_end)
         os.set_blocking(read_end, False)
         job = self.jobs[pid] = _Job(number, pid, read_end)
         self.selector.register(read_end, selectors.EVENT_READ, lambda: self._read(job))
         self._send({"id": number, "pid": pid})
 
-    def _be_the_child(self, request: dict[str, Any], read_end: int, write_end: int) -> NoReturn:
+    def _be_the_child(
+        self, request: dict[str, Any], prepared: "child.Prepared | None", read_end: int, write_end: int
+    ) -> NoReturn:
         code = 1
         try:
             self.prctl(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
@@ -175,7 +182,7 @@ class _Server:
                 os.close(end)
             from bench.execution import child
 
-            child.run(child.Request(**request))
+            child.run(child.Request(**request), prepared)
             sys.stdout.flush()
             sys.stderr.flush()
             code = 0
@@ -238,17 +245,27 @@ class _Server:
         os._exit(0)
 
 
-def _import_plugin(origin: str) -> None:
-    """Import the method's module here, once, as the harness did before; the child reports what may go wrong."""
-    from bench import registry
-    from bench.execution.threads import find_libraries
+def _prepared(request: dict[str, Any]) -> "child.Prepared | None":
+    """What the child of a request needs, made here, where it costs a fraction: a fork copies what it touches.
+
+    None where that goes wrong or has something to say, or where the problem is large: then it is left to the child,
+    which reports it, and which others need not wait for.
+    """
+    from bench.execution import child, threads
 
     modules = len(sys.modules)
-    with contextlib.suppress(Exception):
-        registry.import_origin(origin)
-    if len(sys.modules) > modules:
-        find_libraries()
-        gc.freeze()
+    try:
+        if os.path.getsize(request["problem"]) > LARGE_BYTES:
+            return None
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return child.prepare(child.Request(**request))
+    except Exception:
+        return None
+    finally:
+        if len(sys.modules) > modules:
+            threads.find_libraries()
+            gc.freeze()
 
 
 def _prctl() -> Callable[[int, int], Any]:
