@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import time
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,15 +22,18 @@ from bench.registry import method
 class Chaos:
     """Random rotations, after the fault of that name; `copy` makes different jobs of the same."""
 
-    fault: str = "none"
+    fault: str = "well"
     copy: int = 0
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Floats:
-        """Misbehave, and answer where the fault allows it."""
+        """Misbehave, and answer where the fault allows it; leave a line that tells which job it was that started."""
+        if "CHAOS_STARTS" in os.environ:
+            with open(os.environ["CHAOS_STARTS"], "a") as file:
+                file.write(f"{self.fault} {self.copy} {zlib.crc32(problem.rotations.tobytes())}\n")
         getattr(self, self.fault)()
         return so3.random(rng, problem.n)
 
-    def none(self) -> None:
+    def well(self) -> None:
         """Behave."""
 
     def segfault(self) -> None:
@@ -104,6 +108,10 @@ class Chaos:
             file.truncate(file.tell() // 2)
 
         np.savez = cut
+
+    def slow(self) -> None:
+        """Take a moment."""
+        time.sleep(0.02)
 
     def chatter(self) -> None:
         """Print megabytes."""

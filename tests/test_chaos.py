@@ -65,7 +65,7 @@ def test_chaos(faulty_plugin: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     frame = score(wild.store).frame
     assert sorted(frame["job"]) == sorted(job.id for job in jobs)
     for job, row in zip(jobs, frame.set_index("job").loc[[job.id for job in jobs]].itertuples(), strict=True):
-        assert row.status.startswith(STATUS.get(job.parameters.get("fault", "none"), "ok")), job.parameters
+        assert row.status.startswith(STATUS.get(job.parameters.get("fault", "well"), "ok")), job.parameters
 
     undisturbed = [cell.job.id for cell in calm.cells]
     assert set(undisturbed) < {job.id for job in jobs}
