@@ -10,7 +10,9 @@ import functools
 import importlib
 import json
 import os
+import signal
 import sys
+import threading
 import time
 import traceback
 import warnings
@@ -257,11 +259,12 @@ class _PeakMemory:
 
     def __init__(self) -> None:
         try:
-            Path("/proc/self/clear_refs").write_text("5")
+            with open("/proc/self/clear_refs", "wb", buffering=0) as file:
+                file.write(b"5")
         except OSError:
             self._before = _peak_mib()
         else:
-            self._before = _status_mib("VmRSS")
+            self._before = _status_mib(b"VmRSS")
 
     def peak_mib(self) -> float:
         return max(_peak_mib() - self._before, 0.0)
@@ -269,7 +272,7 @@ class _PeakMemory:
 
 def _peak_mib() -> float:
     try:
-        return _status_mib("VmHWM")
+        return _status_mib(b"VmHWM")
     except OSError:
         import psutil
 
@@ -277,18 +280,29 @@ def _peak_mib() -> float:
         return getattr(memory, "peak_wset", memory.rss) / 2**20
 
 
-def _status_mib(field: str) -> float:
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith(field + ":"):
-            return int(line.split()[1]) / 1024
-    raise OSError(f"/proc/self/status has no {field}")
+def _status_mib(field: bytes) -> float:
+    with open("/proc/self/status", "rb") as file:
+        _, found, rest = file.read().partition(field + b":")
+    if not found:
+        raise OSError(f"/proc/self/status has no {field.decode()}")
+    return int(rest.split(None, 1)[0]) / 1024
 
 
 def main() -> None:
     """Run the request in the file given as the only argument: the way without a fork server."""
+    harness = os.dup(0)
+    threading.Thread(target=_end_after, args=(harness,), daemon=True).start()
     run(Request(**json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))))
     sys.stdout.flush()
     os._exit(0)
+
+
+def _end_after(harness: int) -> None:
+    """End this process, and all of its group, when the harness that holds the other end of this pipe is gone."""
+    os.read(harness, 1)
+    if hasattr(os, "killpg"):
+        os.killpg(os.getpgid(0), signal.SIGKILL)
+    os._exit(1)
 
 
 if __name__ == "__main__":
