@@ -52,6 +52,11 @@ class Chaos:
         """End as at the hands of the kernel."""
         os.kill(os.getpid(), signal.SIGKILL)
 
+    def kill_server(self) -> None:
+        """Kill the process that started this one."""
+        os.kill(os.getppid(), signal.SIGKILL)
+        hang()
+
     def hang(self) -> None:
         """Hang, deaf to TERM, and so does a grandchild."""
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
