@@ -76,6 +76,11 @@ class Chaos:
         """Leave a grandchild that hangs."""
         start(hang)
 
+    def twins(self) -> None:
+        """Fork, and let both processes go on."""
+        if os.fork():
+            os.wait()
+
     def daemon(self) -> None:
         """Leave a grandchild that hangs in a session of its own, its parent gone."""
         signal.signal(signal.SIGTERM, signal.SIG_IGN)

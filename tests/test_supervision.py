@@ -72,6 +72,12 @@ def test_what_a_job_printed_is_kept_where_it_ended_well_too() -> None:
     assert "log" not in report
 
 
+def test_of_a_method_that_forks_one_process_answers() -> None:
+    ended, _, estimate = solve("twins")
+    assert ended.text == "ok"
+    assert estimate is not None
+
+
 def test_a_kill_by_the_kernel_is_told_from_others(monkeypatch: pytest.MonkeyPatch) -> None:
     assert solve("killed")[0].text == "crashed(SIGKILL, from outside the benchmark)"
     counts = iter(range(9))

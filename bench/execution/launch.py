@@ -120,6 +120,8 @@ class _ForkedChild:
             raise LaunchError(f"the fork server did not answer within {IMPORT_LIMIT_S + PATIENCE_S:g} s") from None
         if not message:
             raise self.server.loss()
+        if "refused" in message:
+            raise LaunchError(f"no process could be started: {message['refused']}")
         self.pid = message["pid"]
 
     def wait(self, timeout: float) -> int | None:
@@ -218,6 +220,8 @@ class _ForkServer:
                 child.messages.put({})
 
     def close(self) -> None:
+        if not self.ready:  # it may import for long before it looks at its socket
+            self.process.kill()
         with contextlib.suppress(OSError):  # the server may have gone first
             self.socket.shutdown(socket.SHUT_RDWR)
         self.process.wait()

@@ -4,9 +4,9 @@ A fork saves every job the start of an interpreter and the import of its librari
 fork server is not used because it re-imports the caller's main script in every child.
 
 Messages are lines of JSON on a socket pair. To the server: ``{"id", "request"}`` starts a job, ``{"id", "end"}``
-ends it. From it: ``{"id", "pid"}`` when the child is there, ``{"id", "exit", "log"}`` when it and all that it
-started are gone, with the end of what it printed. When the socket closes, because the harness ended for whatever
-reason, the server kills what is left and goes.
+ends it. From it: ``{"id", "pid"}`` when the child is there, or ``{"id", "refused"}`` when the system starts no
+more; ``{"id", "exit", "log"}`` when it and all that it started are gone, with the end of what it printed. When the
+socket closes, because the harness ended for whatever reason, the server kills what is left and goes.
 
 On Linux a process whose parent dies becomes a child of the job's process, and when that ends, of the server: so
 nothing that a job starts can hide, whatever process group, session or parent it takes.
@@ -56,7 +56,7 @@ def main() -> None:
     connection = socket.socket(fileno=int(sys.argv[1]))
     signal.alarm(int(sys.argv[3]))  # ends this process: an import may hang where no Python code runs
     for name in [*PRELOADED, *sys.argv[4:]]:
-        with contextlib.suppress(Exception):  # the child imports it again, and reports the error in its row
+        with contextlib.suppress(Exception, SystemExit):  # the child imports it again, and reports the error in its row
             importlib.import_module(name)
     if "numba" in sys.modules:
         _start_numba()
@@ -117,6 +117,7 @@ class _Server:
         self.connection = connection
         self.pending = b""
         self.jobs: dict[int, _Job] = {}  # by pid
+        self.helpers = set(processes.children(os.getpid()))  # that libraries have started
         self.prctl = _prctl()
         self.prctl(_SET_CHILD_SUBREAPER, 1)
         self.wakeup, self.wakeup_end = os.pipe()
@@ -156,7 +157,13 @@ class _Server:
     def _fork(self, number: int, request: dict[str, Any]) -> None:
         prepared = _prepared(request)
         read_end, write_end = os.pipe()
-        pid = os.fork()
+        try:
+            pid = os.fork()
+        except OSError as error:  # no more processes, or no memory for one
+            os.close(read_end)
+            os.close(write_end)
+            self._send({"id": number, "refused": str(error)})
+            return
         if pid == 0:
             self._be_the_child(request, prepared, read_end, write_end)
         os.close(write_end)
@@ -225,7 +232,9 @@ class _Server:
     def _sweep(self) -> None:
         """Kill what jobs that have ended left behind: it is this process's own child now."""
         deadline = time.monotonic() + SWEEP_S
-        while (left := set(processes.children(os.getpid())) - set(self.jobs)) and time.monotonic() < deadline:
+        while (
+            left := set(processes.children(os.getpid())) - set(self.jobs) - self.helpers
+        ) and time.monotonic() < deadline:
             for pid in left:
                 processes.kill(pid)
             time.sleep(0.001)
@@ -241,6 +250,7 @@ class _Server:
         for pid in self.jobs:
             processes.kill(pid)
         self.jobs.clear()
+        self.helpers.clear()
         self._sweep()
         os._exit(0)
 
@@ -260,7 +270,7 @@ def _prepared(request: dict[str, Any]) -> "child.Prepared | None":
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             return child.prepare(child.Request(**request))
-    except Exception:
+    except (Exception, SystemExit):
         return None
     finally:
         if len(sys.modules) > modules:
