@@ -1,10 +1,7 @@
 """The local engine: threads that each supervise one child at a time."""
 
-import contextlib
-import queue
-import shutil
 import threading
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import asdict
 from pathlib import Path
@@ -12,6 +9,7 @@ from typing import Any
 
 from bench.execution import outcome
 from bench.execution.child import ESTIMATE_FILE, Request
+from bench.execution.folders import WorkFolders
 from bench.execution.job import execute, record_of
 from bench.execution.launch import Launcher
 from bench.execution.outcome import Outcome
@@ -44,7 +42,7 @@ class LocalEngine:
         self.threads = threads
         self.launcher = Launcher(threads)
         self.stop = threading.Event()
-        self.folders: queue.SimpleQueue[Path] = queue.SimpleQueue()  # one a worker, for one job after another
+        self.folders = WorkFolders(store)
 
     def run(self, cells: Iterable[Cell]) -> Generator[Finished, None, None]:
         """Yield each cell with its record as soon as it is stored.
@@ -52,23 +50,21 @@ class LocalEngine:
         When the caller stops iterating, jobs in progress are ended without a record.
         """
         waiting: set[Future[Finished]] = set()
-        with contextlib.ExitStack() as folders:
-            for _ in range(self.workers):
-                self.folders.put(folders.enter_context(self.store.work_folder()))
-            pool = ThreadPoolExecutor(self.workers)
-            try:
-                for cell in cells:
-                    waiting.add(pool.submit(self._run_one, cell))
-                    if len(waiting) >= 2 * self.workers:
-                        done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                        yield from (future.result() for future in done)
-                while waiting:
+        pool = ThreadPoolExecutor(self.workers)
+        try:
+            for cell in cells:
+                waiting.add(pool.submit(self._run_one, cell))
+                if len(waiting) >= 2 * self.workers:
                     done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                     yield from (future.result() for future in done)
-            finally:
-                self.stop.set()
-                pool.shutdown(cancel_futures=True)
-                self.launcher.close()
+            while waiting:
+                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in done)
+        finally:
+            self.stop.set()
+            pool.shutdown(cancel_futures=True)
+            self.launcher.close()
+            self.folders.close()
 
     def _run_one(self, cell: Cell) -> Finished:
         job = cell.job
@@ -77,23 +73,12 @@ class LocalEngine:
         if cell.method.not_installed:
             return not_installed(cell, self.store, self.limits)
         requires = cell.method.requires
-        with self._folder() as work:
+        with self.folders.empty() as work:
             request = request_of(cell, self.store, work, self.threads)
             ended, report = execute(request, requires, self.launcher, self.limits, self.stop)
             record = record_of(asdict(job), requires, self.limits, ended, report)
             self.store.add_record(job.id, record, work / ESTIMATE_FILE if ended.kind == outcome.OK else None)
         return cell, record
-
-    @contextlib.contextmanager
-    def _folder(self) -> Iterator[Path]:
-        """An empty folder; making and removing one for each job takes longer than much of what else there is to do."""
-        folder = self.folders.get()
-        try:
-            yield folder
-        finally:
-            for left in folder.iterdir():
-                shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
-            self.folders.put(folder)
 
 
 def request_of(cell: Cell, store: Store, folder: Path, threads: int) -> Request:
