@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench import named, registry, selection
+from bench import budget, named, registry, selection
 from bench.errors import InputError
 from bench.plan import Job
 from bench.registry import Catalog, Info, Missing, Source, parameters_of
@@ -30,6 +30,8 @@ class Suite:
         How many seeds, 0 to seeds - 1.
     timeout_s, memory_gib
         Limits of one job; in a timing run, of one round of it.
+    budget
+        Both and the number of threads in one word, in the place of these; see `bench.budget`.
     rounds, baseline
         Of timing runs: how often each job is timed, and the method that the others are compared with, by
         default the first.
@@ -44,6 +46,7 @@ class Suite:
     memory_gib: float = 8.0
     rounds: int = 5
     baseline: str = ""
+    budget: str = ""
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,7 @@ _FIELDS: dict[str, tuple[type, ...]] = {
     "memory_gib": (int, float),
     "rounds": (int,),
     "baseline": (str,),
+    "budget": (str,),
 }
 
 
@@ -106,6 +110,11 @@ def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
     if "baseline" in content and content["baseline"] not in content["methods"]:
         guess = registry.suggestion(content["baseline"], content["methods"])
         raise InputError(f"{where}: the baseline '{content['baseline']}' is not one of its methods{guess}")
+    if "budget" in content:
+        if clash := [key for key in ("timeout_s", "memory_gib") if key in content]:
+            raise InputError(f"{where}: 'budget' stands for '{clash[0]}' too; keep one of them")
+        limits = budget.parse(content["budget"])
+        content |= {"timeout_s": limits.seconds, "memory_gib": limits.memory_gib}
     return Suite(name, content.pop("title", name), **content)
 
 

@@ -80,9 +80,11 @@ class Problem:
     @cached_property
     def components(self) -> Ints:
         """(n,) label of the connected component of each camera; 0 is the largest component."""
+        from scipy import sparse
         from scipy.sparse.csgraph import connected_components
 
-        _, labels = connected_components(self.adjacency(), directed=False)
+        graph = sparse.coo_array((np.ones(self.m), tuple(self.edges.T)), shape=(self.n, self.n))
+        _, labels = connected_components(graph, directed=False)
         sizes = np.bincount(labels)
         rank = np.empty_like(sizes)
         rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))

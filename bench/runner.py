@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from bench import experiment, registry
+from bench import budget, experiment, registry
 from bench.errors import InputError
 from bench.execution import outcome
 from bench.execution.local import Finished, LocalEngine
@@ -37,7 +37,9 @@ class Options:
     seeds, timeout_s, memory_gib
         Override the suite's.
     jobs, threads
-        How many jobs at a time, and how many threads the numerical libraries of each may use.
+        How many jobs at a time, and how many threads the numerical libraries of each may use (by default one).
+    budget
+        Threads, seconds and memory of a job in one word, in the place of these three; see `bench.budget`.
     protocol
         Override the protocol of every dataset that has one.
     rerun
@@ -55,9 +57,10 @@ class Options:
     data_dir: Path | None = None
     seeds: int | None = None
     jobs: int | None = None
-    threads: int = 1
+    threads: int | None = None
     timeout_s: float | None = None
     memory_gib: float | None = None
+    budget: str | None = None
     protocol: str | None = None
     rerun: Rerun = "never"
     timing: bool = False
@@ -98,7 +101,9 @@ class Run:
         self.store = Store.open(folder) if (folder / "plans").is_dir() else Store(folder)
         _check_kind(self.store, options.timing)
         self.unreadable: list[str] = []  # a sentence for each record whose job is run again because of that
-        self.limits = Limits(self.experiment.suite.timeout_s, self.experiment.suite.memory_gib)
+        chosen = self.experiment.suite
+        self.threads = options.threads or (budget.parse(chosen.budget).threads if chosen.budget else 1)
+        self.limits = Limits(chosen.timeout_s, chosen.memory_gib, "" if _given_alone(options) else chosen.budget)
         self.todo = [cell for cell in self.cells if not self._done(cell)]
         if options.timing:  # methods can be compared only where they took turns
             affected = {cell.job.instance_key for cell in self.todo}
@@ -155,10 +160,10 @@ class Run:
         """Run what is not done; yield each cell with its record as it is stored."""
         engine: LocalEngine | TimingEngine
         if self.options.timing:
-            engine = TimingEngine(self.store, self.limits, self.options.threads)
+            engine = TimingEngine(self.store, self.limits, self.threads)
         else:
             workers = self.options.jobs or os.cpu_count() or 1
-            engine = LocalEngine(self.store, self.limits, workers, self.options.threads)
+            engine = LocalEngine(self.store, self.limits, workers, self.threads)
         with contextlib.closing(engine.run(self.todo)) as finished:
             yield from finished
 
@@ -179,9 +184,8 @@ def _resolved(
     changes: dict[str, Any] = {
         "methods": experiment.narrowed(suite.methods, methods) if methods else (*suite.methods, *plugged_in),
         "seeds": options.seeds,
-        "timeout_s": options.timeout_s,
         "rounds": options.rounds,
-        "memory_gib": options.memory_gib,
+        **_limits(options),
     }
     if datasets:
         changes["datasets"] = experiment.narrowed(suite.datasets, datasets)
@@ -189,6 +193,8 @@ def _resolved(
         changes["name"] = "custom"
     suite = replace(suite, **{key: value for key, value in changes.items() if value is not None})
     _check_positive(suite)
+    if options.threads is not None and options.threads < 1:
+        raise InputError(f"threads must be above zero, not {options.threads}")
     return experiment.resolve(
         suite,
         known_methods,
@@ -197,6 +203,22 @@ def _resolved(
         protocol=options.protocol,
         timing=options.timing,
     )
+
+
+def _given_alone(options: Options) -> list[str]:
+    """Limits that were given one by one."""
+    given = {"--threads": options.threads, "--timeout": options.timeout_s, "--memory": options.memory_gib}
+    return [name for name, value in given.items() if value is not None]
+
+
+def _limits(options: Options) -> dict[str, Any]:
+    """Fields of the suite that the limits among the options override."""
+    if options.budget is None:
+        return {"timeout_s": options.timeout_s, "memory_gib": options.memory_gib}
+    if alone := _given_alone(options):
+        raise InputError(f"--budget stands for {alone[0]} too; give one of them")
+    limits = budget.parse(options.budget)
+    return {"budget": limits.name, "timeout_s": limits.seconds, "memory_gib": limits.memory_gib}
 
 
 def _check_kind(store: Store, timing: bool) -> None:

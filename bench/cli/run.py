@@ -38,9 +38,17 @@ def run(
     data_dir: DataDirOption = None,
     seeds: Annotated[int | None, typer.Option(metavar="N", help="Seeds 0 to N-1.")] = None,
     jobs: Annotated[int | None, typer.Option(metavar="N", help="Jobs at a time.  [default: one a core]")] = None,
-    threads: Annotated[int, typer.Option(metavar="N", help="Threads of the numerical libraries in each job.")] = 1,
+    threads: Annotated[
+        int | None, typer.Option(metavar="N", help="Threads of the numerical libraries in each job.  [default: 1]")
+    ] = None,
     timeout: Annotated[float | None, typer.Option(metavar="S", help="Wall clock seconds of one job.")] = None,
     memory: Annotated[float | None, typer.Option(metavar="GIB", help="Resident memory of one job.")] = None,
+    budget: Annotated[
+        str | None,
+        typer.Option(
+            metavar="B", help="Threads, time and GiB of one job in one word, such as 1c-60s-4g or 4c-10m-16g."
+        ),
+    ] = None,
     protocol: ProtocolOption = None,
     align: AlignOption = Align.L1,
     timing: Annotated[
@@ -69,6 +77,7 @@ def run(
         threads=threads,
         timeout_s=timeout,
         memory_gib=memory,
+        budget=budget,
         protocol=protocol.value if protocol else None,
         rerun=rerun.value,
         timing=timing,

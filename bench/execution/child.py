@@ -6,10 +6,13 @@ the folder for its two results, ``estimate.npz`` and ``result.json`` (written la
 
 import copy
 import dataclasses
+import functools
 import importlib
 import json
 import os
+import signal
 import sys
+import threading
 import time
 import traceback
 import warnings
@@ -23,6 +26,7 @@ from bench import registry
 from bench.arrays import load_problem, save_estimate
 from bench.execution import outcome
 from bench.execution.outcome import Outcome
+from bench.execution.threads import pin_threads
 from bench.problem import ROTATION_TOLERANCE, Estimate, Floats, Problem, Skipped
 from bench.seeds import stream
 
@@ -68,13 +72,41 @@ class Request:
     warm_up: bool = True
 
 
-def run(request: Request) -> None:
-    """Run the job and write its results; whatever happens in Python becomes an outcome."""
+@dataclass(frozen=True)
+class Prepared:
+    """What a job needs besides what it is told: the plug-in, the configured method and the problem."""
+
+    info: registry.Info
+    method: Any
+    problem: Problem
+
+
+def prepare(request: Request) -> Prepared:
+    """Import the plug-in, configure the method and load the problem."""
+    module = registry.import_origin(request.origin)
+    info = next(info for info in registry.infos(module, "method") if info.name == request.method)
+    return Prepared(info, info.configure(request.parameters), _loaded(request.problem))
+
+
+@functools.lru_cache(maxsize=1)
+def _loaded(path: str) -> Problem:
+    """Load a problem; the last one is kept, since the jobs of one instance follow each other."""
+    return load_problem(Path(path))
+
+
+def run(request: Request, prepared: Prepared | None = None) -> None:
+    """Run the job and write its results; whatever happens in Python becomes an outcome.
+
+    Parameters
+    ----------
+    prepared
+        What `prepare` gave for this request, where that was called before.
+    """
     result: dict[str, Any] = {}
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            ended = _solve(request, result)
+            ended = _solve(request, prepared or prepare(request), result)
         result["warnings"] = sorted({f"{w.category.__name__}: {w.message}" for w in caught})
     except Skipped as skip:
         ended = Outcome(outcome.SKIPPED, str(skip))
@@ -89,17 +121,14 @@ def run(request: Request) -> None:
     temporary.replace(Path(request.folder, RESULT_FILE))
 
 
-def _solve(request: Request, result: dict[str, Any]) -> Outcome:
-    registry.import_origin(request.origin)
-    info = _info(request)
-    method = info.configure(request.parameters)
-    problem = load_problem(Path(request.problem))
+def _solve(request: Request, prepared: Prepared, result: dict[str, Any]) -> Outcome:
+    info, method, problem = prepared.info, prepared.method, prepared.problem
     limit = info.fact("max_cameras", method)
     if limit is not None and problem.n > limit:
         raise Skipped(f"{problem.n} cameras, and {info.name} is meant for at most {limit}")
     for name in info.requires:
         importlib.import_module(name)
-    result["threads"] = _pin_threads(request.threads)
+    result["threads"] = pin_threads(request.threads)
     result["core"] = _pin_core(request.core)
     if request.warm_up and hasattr(method, "warm_up"):
         method.warm_up()
@@ -110,7 +139,10 @@ def _solve(request: Request, result: dict[str, Any]) -> Outcome:
     pristine = copy.copy(solved)  # what a solution caches in its problem, the next one must not find
     memory = _PeakMemory()
     processor = time.process_time()
+    process = os.getpid()
     estimate, elapsed = _timed(method, solved, stream(request.seed, "method", info.name))
+    if os.getpid() != process:
+        os._exit(0)  # the method forked, and did not keep the other from returning here
     processor = time.process_time() - processor
     result["peak_mib"] = memory.peak_mib()
     result |= {"solve_s": elapsed - estimate.conversion_s, "conversion_s": estimate.conversion_s}
@@ -130,6 +162,8 @@ def _solve(request: Request, result: dict[str, Any]) -> Outcome:
 
 
 def _timed(method: Any, problem: Problem, rng: np.random.Generator) -> tuple[Estimate, float]:
+    if hasattr(os, "sched_yield"):
+        os.sched_yield()  # whoever waits for this core has his turn now, and not in the middle of a short solution
     start = time.perf_counter()
     answer = method.solve(problem, rng)
     elapsed = time.perf_counter() - start
@@ -150,11 +184,6 @@ def _repeated(method: Any, problem: Problem, request: Request, name: str) -> tup
         total += elapsed
         solves_s.append(elapsed - estimate.conversion_s)
     return solves_s, 1 - processor / total
-
-
-def _info(request: Request) -> registry.Info:
-    module = registry.import_origin(request.origin)
-    return next(info for info in registry.infos(module, "method") if info.name == request.method)
 
 
 def _what_is_wrong(problem: Problem, estimate: Estimate, elapsed: float) -> str:
@@ -217,19 +246,6 @@ def _scalars(estimate: Estimate) -> dict[str, Any]:
     }
 
 
-def _pin_threads(threads: int) -> int:
-    """Pin every numerical library that is loaded, and return the largest number of threads that any still has."""
-    import threadpoolctl
-
-    threadpoolctl.threadpool_limits(threads)
-    counts = [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
-    torch = sys.modules.get("torch")
-    if torch is not None:
-        torch.set_num_threads(threads)
-        counts.append(torch.get_num_threads())
-    return max(counts, default=threads)
-
-
 def _pin_core(core: int | None) -> int | None:
     """Pin this process to a core where the system can; the core, or None."""
     if core is None or not hasattr(os, "sched_setaffinity"):
@@ -246,11 +262,12 @@ class _PeakMemory:
 
     def __init__(self) -> None:
         try:
-            Path("/proc/self/clear_refs").write_text("5")
+            with open("/proc/self/clear_refs", "wb", buffering=0) as file:
+                file.write(b"5")
         except OSError:
             self._before = _peak_mib()
         else:
-            self._before = _status_mib("VmRSS")
+            self._before = _status_mib(b"VmRSS")
 
     def peak_mib(self) -> float:
         return max(_peak_mib() - self._before, 0.0)
@@ -258,7 +275,7 @@ class _PeakMemory:
 
 def _peak_mib() -> float:
     try:
-        return _status_mib("VmHWM")
+        return _status_mib(b"VmHWM")
     except OSError:
         import psutil
 
@@ -266,18 +283,29 @@ def _peak_mib() -> float:
         return getattr(memory, "peak_wset", memory.rss) / 2**20
 
 
-def _status_mib(field: str) -> float:
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith(field + ":"):
-            return int(line.split()[1]) / 1024
-    raise OSError(f"/proc/self/status has no {field}")
+def _status_mib(field: bytes) -> float:
+    with open("/proc/self/status", "rb") as file:
+        _, found, rest = file.read().partition(field + b":")
+    if not found:
+        raise OSError(f"/proc/self/status has no {field.decode()}")
+    return int(rest.split(None, 1)[0]) / 1024
 
 
 def main() -> None:
     """Run the request in the file given as the only argument: the way without a fork server."""
+    harness = os.dup(0)
+    threading.Thread(target=_end_after, args=(harness,), daemon=True).start()
     run(Request(**json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))))
     sys.stdout.flush()
     os._exit(0)
+
+
+def _end_after(harness: int) -> None:
+    """End this process, and all of its group, when the harness that holds the other end of this pipe is gone."""
+    os.read(harness, 1)
+    if hasattr(os, "killpg"):
+        os.killpg(os.getpgid(0), signal.SIGKILL)
+    os._exit(1)
 
 
 if __name__ == "__main__":

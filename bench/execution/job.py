@@ -1,6 +1,5 @@
 """Run one job: start its child, watch it, and turn whatever happened into a record."""
 
-import json
 import threading
 import time
 from collections.abc import Mapping
@@ -10,12 +9,13 @@ from typing import Any
 
 from bench import provenance
 from bench.execution import outcome
-from bench.execution.child import RESULT_FILE, Request
-from bench.execution.launch import LOG_FILE, Launcher, LaunchError
+from bench.execution.child import Request
+from bench.execution.launch import Launcher, LaunchError, ServerLostError
 from bench.execution.outcome import Outcome
+from bench.execution.output import UnusableError, read_output
 from bench.execution.supervise import Limits, supervise
 
-LOG_TAIL = 4000  # characters of the child's output that a record keeps
+LOG_OF_OK = 1000  # characters of the output of a job that ended well; others keep all that `log.Tail` has
 
 
 def execute(
@@ -23,28 +23,42 @@ def execute(
 ) -> tuple[Outcome, dict[str, Any]]:
     """Run one request in a supervised child.
 
+    A job whose fork server dies is started once more: it may have been another's fault.
+
     Returns
     -------
-    The outcome, and what the child reported: its scalars, `wall_s`, and `log` where the outcome is not ``ok``.
+    The outcome, and what the child reported: its scalars, `wall_s`, and `log`, the end of its output where it had any.
     """
     start = time.monotonic()
-    folder = Path(request.folder)
-    report: dict[str, Any] = {}
     try:
-        ended = supervise(launcher.start(request, requires), limits, stop)
-    except LaunchError as error:
-        ended = Outcome(outcome.CRASHED, str(error))
-    if isinstance(ended, int):
         try:
-            report = json.loads((folder / RESULT_FILE).read_text(encoding="utf-8"))
-        except (FileNotFoundError, ValueError):
-            ended = outcome.crashed(ended)
-        else:
-            ended = Outcome(report.pop("kind"), report.pop("detail"))
-    report["wall_s"] = time.monotonic() - start
-    if ended.kind != outcome.OK:
-        report["log"] = _tail(folder / LOG_FILE)
-    return ended, report
+            ended, report = _attempt(request, requires, launcher, limits, stop)
+        except ServerLostError:
+            ended, report = _attempt(request, requires, launcher, limits, stop)
+    except (LaunchError, ServerLostError) as error:
+        ended, report = Outcome(outcome.CRASHED, str(error)), {}
+    return ended, report | {"wall_s": time.monotonic() - start}
+
+
+def _attempt(
+    request: Request, requires: tuple[str, ...], launcher: Launcher, limits: Limits, stop: threading.Event
+) -> tuple[Outcome, dict[str, Any]]:
+    kills = outcome.kernel_kills()
+    child = launcher.start(request, requires)
+    ended = supervise(child, limits, stop)
+    report: dict[str, Any] = {}
+    if isinstance(ended, int):
+        ended, report = _reported(Path(request.folder), ended, kills)
+    log = child.log if ended.kind != outcome.OK else child.log[-LOG_OF_OK:]
+    return ended, report | ({"log": log} if log.strip() else {})
+
+
+def _reported(folder: Path, code: int, kills: int) -> tuple[Outcome, dict[str, Any]]:
+    """What a child that ended by itself has left; `kills` is `outcome.kernel_kills` from before it was started."""
+    try:
+        return read_output(folder) or (outcome.crashed(code, by_kernel=outcome.kernel_kills() > kills), {})
+    except UnusableError as error:
+        return Outcome(outcome.INVALID_OUTPUT, str(error)), {}
 
 
 def record_of(
@@ -55,22 +69,14 @@ def record_of(
     report: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Everything that is kept of a job besides its arrays."""
+    budget = {"budget": limits.budget} if limits.budget else {}
     return {
         "job": dict(job),
         "outcome": ended.kind,
         "status": ended.text,
         "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-        "limits": {"seconds": limits.seconds, "memory_gib": limits.memory_gib},
+        "limits": {"seconds": limits.seconds, "memory_gib": limits.memory_gib} | budget,
         "versions": provenance.versions(requires),
         "provenance": provenance.of_this_run(),
         **report,
     }
-
-
-def _tail(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            file.seek(max(path.stat().st_size - LOG_TAIL, 0))
-            return file.read().decode(errors="replace")
-    except FileNotFoundError:
-        return ""

@@ -4,17 +4,23 @@ import contextlib
 import json
 import os
 import queue
+import signal
 import socket
 import subprocess
 import sys
 import threading
 from dataclasses import asdict
-from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
+import psutil
+
+from bench.execution import processes
 from bench.execution.child import Request
+from bench.execution.fresh import FreshInterpreter
+from bench.execution.processes import GRACE_S
 
-LOG_FILE = "log.txt"
+IMPORT_LIMIT_S = 120  # for what a method requires
+PATIENCE_S = 15.0  # for the server to do what takes it milliseconds, on a machine that is very busy
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -24,21 +30,36 @@ THREAD_VARIABLES = (
     "NUMBA_NUM_THREADS",
 )
 CAN_FORK = hasattr(os, "fork") and sys.platform != "darwin"  # macOS libraries do not survive a fork
-SERVER_GONE = "the fork server died while importing what the method requires"
-START_TIMEOUT_S = 120.0  # the first job of a server waits for its imports
 
 
 class LaunchError(RuntimeError):
     """The child could not be started."""
 
 
+class ServerLostError(RuntimeError):
+    """The server of a child died while the child was running."""
+
+
 class Child(Protocol):
-    """A process that runs one job, leader of its own process group."""
+    """A process that runs one job, leader of its own process group.
+
+    Once it has ended, nothing that it started is left, and `log` has the end of what it printed.
+    """
 
     pid: int
+    log: str
 
-    def wait(self, timeout: float | None) -> int | None:
-        """Exit code (minus the signal's number where a signal ended it), or None when it still runs."""
+    def wait(self, timeout: float) -> int | None:
+        """Exit code (minus the signal's number where a signal ended it), or None when it still runs.
+
+        Raises
+        ------
+        ServerLostError
+            Where its server died.
+        """
+
+    def end(self) -> None:
+        """End it and what it started: TERM first, then KILL."""
 
 
 class Launcher:
@@ -48,27 +69,30 @@ class Launcher:
     """
 
     def __init__(self, threads: int) -> None:
+        self.threads = threads
         self.environment = os.environ | {name: str(threads) for name in THREAD_VARIABLES}
         self.servers: dict[tuple[str, ...], _ForkServer] = {}
         self.lock = threading.Lock()
 
     def start(self, request: Request, requires: tuple[str, ...]) -> Child:
-        """Start the job; its output goes to `LOG_FILE` in the request's folder.
+        """Start the job.
 
         Raises
         ------
         LaunchError
             Where the fork server hangs or dies while it imports what the method requires.
+        ServerLostError
+            Where it dies later.
         """
         if not CAN_FORK:
-            return _FreshInterpreter(request, self.environment)
+            return FreshInterpreter(request, self.environment)
         with self.lock:
             server = self.servers.get(requires)
             if server is not None and not server.alive:
                 server.close()
                 server = None
             if server is None:
-                server = self.servers[requires] = _ForkServer(requires, self.environment)
+                server = self.servers[requires] = _ForkServer(requires, self.threads, self.environment)
         return server.start(request)
 
     def close(self) -> None:
@@ -77,58 +101,72 @@ class Launcher:
             server.close()
 
 
-class _FreshInterpreter:
-    def __init__(self, request: Request, environment: dict[str, str]) -> None:
-        file = Path(request.folder, "request.json")
-        file.write_text(json.dumps(asdict(request)), encoding="utf-8")
-        with Path(request.folder, LOG_FILE).open("wb") as log:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", "bench.execution.child", str(file)],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                env=environment,
-                start_new_session=True,
-            )
-        self.pid = self.process.pid
-
-    def wait(self, timeout: float | None) -> int | None:
-        try:
-            return self.process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            return None
-
-
 class _ForkedChild:
-    """Fed by the server's messages: first the pid, then the exit code."""
+    """Fed by the server's messages: first the pid, then how it ended; an empty one when the server is gone."""
 
-    def __init__(self) -> None:
-        self.messages: queue.SimpleQueue[int] = queue.SimpleQueue()
+    def __init__(self, server: "_ForkServer", number: int) -> None:
+        self.server = server
+        self.number = number
+        self.messages: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self.pid = 0
+        self.log = ""
+        self.over = False
+        self.descendants: set[psutil.Process] = set()  # that were seen; they know when a pid is another's
 
     def wait_for_pid(self) -> None:
         try:
-            self.pid = self.messages.get(timeout=START_TIMEOUT_S)
+            message = self.messages.get(timeout=IMPORT_LIMIT_S + PATIENCE_S)
         except queue.Empty:
-            raise LaunchError(f"the fork server did not answer within {START_TIMEOUT_S:g} s") from None
-        if self.pid < 0:
-            raise LaunchError(SERVER_GONE)
+            raise LaunchError(f"the fork server did not answer within {IMPORT_LIMIT_S + PATIENCE_S:g} s") from None
+        if not message:
+            raise self.server.loss()
+        if "refused" in message:
+            raise LaunchError(f"no process could be started: {message['refused']}")
+        self.pid = message["pid"]
 
-    def wait(self, timeout: float | None) -> int | None:
+    def wait(self, timeout: float) -> int | None:
         try:
-            return self.messages.get(timeout=timeout)
+            message = self.messages.get(timeout=timeout)
         except queue.Empty:
+            self._look()
             return None
+        self.over = True
+        if not message:
+            self._kill_orphans()
+            raise self.server.loss()
+        self.log = message["log"]
+        return message["exit"]
+
+    def end(self) -> None:
+        if not self.over:
+            self.server.send({"id": self.number, "end": True})
+            with contextlib.suppress(ServerLostError):
+                self.wait(GRACE_S + PATIENCE_S)
+
+    def _look(self) -> None:
+        """Remember the descendants, for the day the server, which would find them, is gone."""
+        known = {process.pid for process in self.descendants}
+        for pid in processes.family(self.pid)[1:]:
+            if pid not in known:
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    self.descendants.add(psutil.Process(pid))
+
+    def _kill_orphans(self) -> None:
+        """Kill what a lost server has left: the child itself has ended with it, where the system can see to that."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.pid, signal.SIGKILL)
+        for process in self.descendants:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()
 
 
 class _ForkServer:
-    SERVER_DIED = -9
-
-    def __init__(self, modules: tuple[str, ...], environment: dict[str, str]) -> None:
+    def __init__(self, modules: tuple[str, ...], threads: int, environment: dict[str, str]) -> None:
         self.socket, theirs = socket.socketpair()
         with theirs:
+            arguments = [theirs.fileno(), threads, IMPORT_LIMIT_S, *modules]
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "bench.execution.server", str(theirs.fileno()), *modules],
+                [sys.executable, "-m", "bench.execution.server", *map(str, arguments)],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -137,6 +175,7 @@ class _ForkServer:
                 start_new_session=True,  # so that Ctrl-C reaches the harness alone
             )
         self.alive = True
+        self.ready = False  # once it has started a child
         self.lock = threading.Lock()
         self.children: dict[int, _ForkedChild] = {}
         self.count = 0
@@ -144,21 +183,26 @@ class _ForkServer:
         self.reader.start()
 
     def start(self, request: Request) -> _ForkedChild:
-        child = _ForkedChild()
         with self.lock:
             if not self.alive:
-                raise LaunchError(SERVER_GONE)
+                raise self.loss()
             self.count += 1
-            self.children[self.count] = child
-            message = {
-                "id": self.count,
-                "request": asdict(request),
-                "log": str(Path(request.folder, LOG_FILE)),
-            }
-            with contextlib.suppress(BrokenPipeError):  # the reader tells the child that the server is gone
-                self.socket.sendall(json.dumps(message).encode() + b"\n")
+            child = self.children[self.count] = _ForkedChild(self, self.count)
+        self.send({"id": child.number, "request": asdict(request)})
         child.wait_for_pid()
         return child
+
+    def send(self, message: dict[str, object]) -> None:
+        with self.lock, contextlib.suppress(OSError):  # the reader tells the children that the server is gone
+            self.socket.sendall(json.dumps(message).encode() + b"\n")
+
+    def loss(self) -> LaunchError | ServerLostError:
+        """What it means that the server is gone."""
+        if self.ready:
+            return ServerLostError("the fork server died while the job was running")
+        took_long = self.process.wait() == -signal.SIGALRM
+        what = f"took more than {IMPORT_LIMIT_S:g} s" if took_long else "died"
+        return LaunchError(f"the fork server {what} while importing what the method requires")
 
     def _read(self) -> None:
         # A server that dies with unread messages resets the connection instead of closing it.
@@ -166,15 +210,18 @@ class _ForkServer:
             for line in lines:
                 message = json.loads(line)
                 if "pid" in message:
-                    self.children[message["id"]].messages.put(message["pid"])
+                    self.ready = True
+                    self.children[message["id"]].messages.put(message)
                 else:
-                    self.children.pop(message["id"]).messages.put(message["exit"])
+                    self.children.pop(message["id"]).messages.put(message)
         with self.lock:
             self.alive = False
             for child in self.children.values():
-                child.messages.put(self.SERVER_DIED)
+                child.messages.put({})
 
     def close(self) -> None:
+        if not self.ready:  # it may import for long before it looks at its socket
+            self.process.kill()
         with contextlib.suppress(OSError):  # the server may have gone first
             self.socket.shutdown(socket.SHUT_RDWR)
         self.process.wait()

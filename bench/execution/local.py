@@ -9,6 +9,7 @@ from typing import Any
 
 from bench.execution import outcome
 from bench.execution.child import ESTIMATE_FILE, Request
+from bench.execution.folders import WorkFolders
 from bench.execution.job import execute, record_of
 from bench.execution.launch import Launcher
 from bench.execution.outcome import Outcome
@@ -41,6 +42,7 @@ class LocalEngine:
         self.threads = threads
         self.launcher = Launcher(threads)
         self.stop = threading.Event()
+        self.folders = WorkFolders(store)
 
     def run(self, cells: Iterable[Cell]) -> Generator[Finished, None, None]:
         """Yield each cell with its record as soon as it is stored.
@@ -62,6 +64,7 @@ class LocalEngine:
             self.stop.set()
             pool.shutdown(cancel_futures=True)
             self.launcher.close()
+            self.folders.close()
 
     def _run_one(self, cell: Cell) -> Finished:
         job = cell.job
@@ -70,7 +73,7 @@ class LocalEngine:
         if cell.method.not_installed:
             return not_installed(cell, self.store, self.limits)
         requires = cell.method.requires
-        with self.store.work_folder() as work:
+        with self.folders.empty() as work:
             request = request_of(cell, self.store, work, self.threads)
             ended, report = execute(request, requires, self.launcher, self.limits, self.stop)
             record = record_of(asdict(job), requires, self.limits, ended, report)
