@@ -175,10 +175,10 @@ def _cells_of(
     for info, parameters in methods:
         configured_method = info.configure(parameters)
         repeated = not source.seeded and not info.fact("deterministic", configured_method)
-        complete = parameters_of(configured_method)
+        complete, source_hash = parameters_of(configured_method), info.source_hash
         for method_seed in range(seeds) if repeated else (seed,):
             timed = [rounds] if rounds else []
-            identity = digest([SCHEMA, key, info.name, complete, info.source_hash, method_seed, *timed])
+            identity = digest([SCHEMA, key, info.name, complete, source_hash, method_seed, *timed])
             job = Job(
                 identity,
                 label,
@@ -190,6 +190,8 @@ def _cells_of(
                 parameters,
                 method_seed,
                 rounds,
+                source_hash,
+                dataset.origin,
             )
             cells.append(Cell(job, source, info))
     return cells

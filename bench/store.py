@@ -54,6 +54,8 @@ class Job:
         Seed of the run.
     rounds
         How often a timing run times it; zero for the job of an ordinary run.
+    source_hash, dataset_origin
+        Hash of the method's source, and the module or file that the dataset is in.
     """
 
     id: str
@@ -66,6 +68,8 @@ class Job:
     parameters: Mapping[str, Any]
     seed: int
     rounds: int = 0
+    source_hash: str = ""
+    dataset_origin: str = ""
 
     @property
     def cell(self) -> tuple[str, str, str, str, int]:

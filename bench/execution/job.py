@@ -51,6 +51,7 @@ def record_of(
     job: Mapping[str, Any],
     requires: tuple[str, ...],
     limits: Limits,
+    threads: int,
     ended: Outcome,
     report: Mapping[str, Any],
 ) -> dict[str, Any]:
@@ -60,7 +61,7 @@ def record_of(
         "outcome": ended.kind,
         "status": ended.text,
         "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-        "limits": {"seconds": limits.seconds, "memory_gib": limits.memory_gib},
+        "limits": {"seconds": limits.seconds, "memory_gib": limits.memory_gib, "threads": threads},
         "versions": provenance.versions(requires),
         "provenance": provenance.of_this_run(),
         **report,
