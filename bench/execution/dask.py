@@ -47,6 +47,7 @@ LONGEST = 256  # jobs of a chunk
 AHEAD = 2  # chunks in flight for each thread of a worker
 CONNECT_S = 10.0
 POLL_S = 0.05
+KEEP_S = 2.0
 
 Chunk: TypeAlias = "Future[list[dict[str, Any]]]"
 
@@ -103,23 +104,45 @@ class DaskEngine:
     @contextlib.contextmanager
     def _client(self, jobs: int) -> Iterator[Client]:
         with contextlib.ExitStack() as stack:
-            address: LocalCluster | str | None = self.scheduler
-            if address is None:
-                address = stack.enter_context(
-                    LocalCluster(
-                        n_workers=min(self.workers, jobs),
-                        threads_per_worker=1,
-                        processes=True,
-                        memory_limit=0,
-                        dashboard_address=None,
-                        silence_logs=logging.CRITICAL,
-                    )
-                )
+            address = self.scheduler or stack.enter_context(_own_cluster(min(self.workers, jobs)))
             try:
                 client = Client(address, timeout=CONNECT_S, set_as_default=False)
             except (OSError, ValueError) as error:
                 raise InputError(f"--scheduler {self.scheduler}: no dask scheduler answers there ({error})") from error
             yield stack.enter_context(client)
+
+
+@contextlib.contextmanager
+def _own_cluster(workers: int) -> Iterator[LocalCluster]:
+    """A cluster on this machine, which keeps its number of workers."""
+    over = threading.Event()
+
+    def keep(cluster: LocalCluster) -> None:
+        # A nanny restarts its worker, but the cluster gives up a worker whose restart happens to coincide with a
+        # check; asking for the same number again makes another.
+        while not over.wait(KEEP_S):
+            cluster.scale(workers)
+
+    try:
+        started = LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=0,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+        )
+    except RuntimeError as error:
+        hint = "in a script, bench.run must stand below: if __name__ == '__main__':"
+        raise InputError(f"the dask cluster on this machine did not start ({error}); {hint}") from error
+    with started as cluster:
+        keeper = threading.Thread(target=keep, args=(cluster,), daemon=True)
+        keeper.start()
+        try:
+            yield cluster
+        finally:
+            over.set()
+            keeper.join()
 
 
 class Supervisor(WorkerPlugin):
