@@ -223,6 +223,8 @@ def test_a_client_that_ends_leaves_its_records_and_nothing_else(faulty_plugin: P
         faulty_plugin, tmp_path / "run", [f"faulty[fault=slow,mark={tmp_path / 'runs'}]"], ["toy"], seeds=500
     )
     done = len(rest.cells) - len(rest.todo)
+    records = [rest.store.record(cell.job.id) for cell in rest.cells]
+    assert {record["outcome"] for record in records if record} == {"ok"}
     assert 2 <= done <= len(marks(tmp_path / "runs")) <= done + 2
 
 

@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import logging
 import math
+import signal
 import threading
 import time
 import uuid
@@ -91,15 +92,16 @@ class DaskEngine:
         if not waiting:
             return
         told = {"command": provenance.of_this_run()["command"], "run": uuid.uuid4().hex}
-        supervisor = Supervisor(self.store, self.limits, self.threads, told)
+        supervisor = Supervisor(self.store, self.limits, self.threads, told, own=self.scheduler is None)
         with self._client(len(waiting)) as client:
             client.register_plugin(supervisor)
             dispatch = _Dispatch(client, supervisor, self.workers, waiting)
             try:
                 yield from dispatch.finished()
             finally:
-                client.cancel(list(dispatch.running))
-                client.unregister_worker_plugin(supervisor.name)
+                with contextlib.suppress(OSError):  # the scheduler may have gone first
+                    client.cancel(list(dispatch.running))
+                    client.unregister_worker_plugin(supervisor.name)
 
     @contextlib.contextmanager
     def _client(self, jobs: int) -> Iterator[Client]:
@@ -148,15 +150,20 @@ def _own_cluster(workers: int) -> Iterator[LocalCluster]:
 class Supervisor(WorkerPlugin):
     """What a worker process keeps for one run: the launcher of its children, until the run or the worker ends."""
 
-    def __init__(self, store: Store, limits: Limits, threads: int, told: dict[str, str]) -> None:
+    def __init__(self, store: Store, limits: Limits, threads: int, told: dict[str, str], *, own: bool) -> None:
         self.store = store
         self.limits = limits
         self.threads = threads
         self.told = told
+        self.own = own
         self.name = f"rotsync-{told['run']}"
 
     def setup(self, worker: Worker) -> None:
         """On the worker: get ready."""
+        if self.own:
+            signal.signal(
+                signal.SIGINT, signal.SIG_IGN
+            )  # Ctrl-C in a terminal reaches all; the client ends its workers
         self.launcher = Launcher(self.threads)
         self.stop = threading.Event()
         self.lock = threading.Lock()
