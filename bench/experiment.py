@@ -159,6 +159,11 @@ def _absence(dataset: str, names: Sequence[str], command: str) -> str:
     return f"{what} not on disk{which}; get {'them' if len(names) > 1 else 'it'} with: {command}"
 
 
+def instance_key(dataset: Info, configured: Any, source: Source) -> str:
+    """Identity of an instance: its dataset with every parameter, its name and what determines its bytes."""
+    return digest([dataset.name, parameters_of(configured), source.name, source.revision])
+
+
 def _cells_of(
     source: Source,
     dataset: Info,
@@ -170,7 +175,7 @@ def _cells_of(
     rounds: int,
 ) -> list[Cell]:
     """Cells of one instance. On data that no seed changes, a deterministic method needs one seed only."""
-    key = digest([dataset.name, parameters_of(configured), source.name, source.revision])
+    key = instance_key(dataset, configured, source)
     cells = []
     for info, parameters in methods:
         configured_method = info.configure(parameters)

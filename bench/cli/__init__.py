@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from bench.cli import check, data, list_, new, paper, plot, run, solve, table
+from bench.cli import check, data, list_, new, paper, plot, rerun, run, solve, table
 
 app = typer.Typer(
     name="bench",
@@ -17,6 +17,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("run", epilog=run.EPILOG)(run.run)
+app.command("rerun")(rerun.rerun)
 app.command("list")(list_.list_)
 app.command("table")(table.table)
 app.command("plot")(plot.plot)

@@ -74,7 +74,7 @@ def run(request: Request) -> None:
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            ended = _solve(request, result)
+            ended = solve(request, result)
         result["warnings"] = sorted({f"{w.category.__name__}: {w.message}" for w in caught})
     except Skipped as skip:
         ended = Outcome(outcome.SKIPPED, str(skip))
@@ -89,7 +89,8 @@ def run(request: Request) -> None:
     temporary.replace(Path(request.folder, RESULT_FILE))
 
 
-def _solve(request: Request, result: dict[str, Any]) -> Outcome:
+def solve(request: Request, result: dict[str, Any]) -> Outcome:
+    """Run the job, write its estimate and fill in `result`; whatever the method raises comes through."""
     registry.import_origin(request.origin)
     info = _info(request)
     method = info.configure(request.parameters)
