@@ -117,7 +117,7 @@ def prepare(path: Path, data_dir: Path | None = None, plugins: Sequence[Path] = 
     method = methods[job.method]
     run = next((folder for folder in path.resolve().parents if (folder / "plans").is_dir()), None)
     store = Store.open(run) if run is not None else None
-    problem, differences = _problem(job, data_dir, plugins or _plugin_files(job.dataset_origin), store)
+    problem, differences = _problem(job, data_dir, plugins, store)
     differences += _changes(job, record, method)
     limits = record["limits"]
     threads = limits.get("threads") or record.get("threads") or 1
@@ -159,21 +159,33 @@ def _problem(
     job: Job, data_dir: Path | None, plugins: Sequence[Path], store: Store | None
 ) -> tuple[Problem, list[str]]:
     """The problem, made again where that gives the same instance, else the stored one, else what there is now."""
+    stored = None
+    if store is not None and store.problem_path(job.instance_key).exists():
+        stored = store.instance(job.instance_key).problem
+    try:
+        now, key = _source(job, data_dir, plugins or _plugin_files(job.dataset_origin))
+    except InputError as error:
+        if stored is None:
+            raise
+        return stored, [f"{error}; the instance stored with the run is used"]
+    if key == job.instance_key:
+        return now.load().problem, []
+    changed = f"the instance {job.dataset} {job.instance} has changed"
+    if stored is not None:
+        return stored, [f"{changed}; the one stored with the run is used"]
+    return now.load().problem, [f"{changed}, and the one of then is not stored here; that of today is used"]
+
+
+def _source(job: Job, data_dir: Path | None, plugins: Sequence[Path]) -> tuple[Source, str]:
+    """The instance as it is today, and its key."""
     ((info, parameters),) = registry.catalog("dataset", plugins).select([job.dataset])
     configured = info.configure(parameters)
-    found = [s for s in configured.sources(data_dir, job.seed) if s.name == job.instance]
-    now = next((s for s in found if isinstance(s, Source)), None)
-    if now is not None and instance_key(info, configured, now) == job.instance_key:
-        return now.load().problem, []
-    what = f"the instance {job.dataset} {job.instance}"
-    state = f"{what} has changed" if now is not None else f"{what} is not to be had here"
-    if store is not None and store.problem_path(job.instance_key).exists():
-        return store.instance(job.instance_key).problem, [f"{state}; the one stored with the run is used"]
-    if now is not None:
-        return now.load().problem, [f"{state}, and the one of then is not stored here; that of today is used"]
-    commands = {s.command for s in found if isinstance(s, Missing)}
-    hint = f"; get it with: {commands.pop()}" if commands else ", and the dataset has none of this name"
-    raise InputError(f"{what} is not on disk{hint}")
+    for found in configured.sources(data_dir, job.seed):
+        if found.name == job.instance:
+            if isinstance(found, Missing):
+                raise InputError(f"{job.dataset} {job.instance} is not on disk; get it with: {found.command}")
+            return found, instance_key(info, configured, found)
+    raise InputError(f"{job.dataset} has no instance '{job.instance}' any more")
 
 
 def _changes(job: Job, record: Mapping[str, Any], method: Info) -> list[str]:

@@ -67,8 +67,10 @@ def test_an_estimate_that_differs_is_told_by_its_angle(faulty_plugin: Path, tmp_
     [("segfault", "crashed(SIGSEGV)"), ("raise", "error(KeyError: 'no such thing')"), ("skip", "skipped(not today)")],
 )
 def test_a_failure_is_repeated_too(faulty_plugin: Path, tmp_path: Path, fault: str, status: str) -> None:
-    done = bench("rerun", recorded(faulty_plugin, tmp_path / "run", f"faulty[fault={fault}]"))
-    assert f"then: {status}\nnow:  {status}\n" in done.stdout
+    ready = prepare(recorded(faulty_plugin, tmp_path / "run", f"faulty[fault={fault}]"))
+    ended, _, estimate = ready.supervised()
+    assert ended.text == ready.record["status"] == status
+    assert ready.same(ended, estimate)
 
 
 def test_the_limits_of_the_record_hold(faulty_plugin: Path, tmp_path: Path) -> None:
@@ -103,23 +105,24 @@ def test_other_versions_are_said(faulty_plugin: Path, tmp_path: Path) -> None:
 
 def test_a_changed_instance_is_taken_from_the_run(faulty_plugin: Path, tmp_path: Path, elsewhere: Path) -> None:
     scenes = tmp_path / "scenes"
-    write_scene(scenes / "Small")
+    write_scene(scenes / "Alamo")
     record = recorded(
-        faulty_plugin, tmp_path / "run", "spanning-tree", "1dsfm[scene=Small]", data_dir=scenes, plugins=()
+        faulty_plugin, tmp_path / "run", "spanning-tree", "1dsfm[scene=Alamo]", data_dir=scenes, plugins=()
     )
     assert prepare(record, scenes).differences == ()
 
-    (scenes / "Small" / "cc.txt").write_text("1\n3\n4\n5\n")
+    (scenes / "Alamo" / "cc.txt").write_text("1\n3\n4\n5\n")
     (sentence,) = prepare(record, scenes).differences
     assert sentence.endswith("has changed; the one stored with the run is used")
     (sentence,) = prepare(record).differences
-    assert sentence.endswith("is not to be had here; the one stored with the run is used")
+    assert sentence.startswith("1dsfm[scene=Alamo] Alamo is not on disk; get it with: python -m bench data fetch")
+    assert sentence.endswith("the instance stored with the run is used")
     assert "bit-identical" in bench("rerun", record, "--data-dir", scenes).stdout
 
     alone = Path(shutil.copy(record, tmp_path / "alone.json"))
     (sentence,) = prepare(alone, scenes).differences
     assert sentence.endswith("that of today is used")
-    with pytest.raises(InputError, match=r"is not on disk; get it with: python -m bench data fetch"):
+    with pytest.raises(InputError, match="Alamo is not on disk; get it with"):
         prepare(alone)
 
 
