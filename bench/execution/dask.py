@@ -217,10 +217,14 @@ def run_chunk(supervisor: str, jobs: Sequence[Job]) -> list[dict[str, Any]]:
     return plugin.run(jobs)
 
 
+_importing = threading.Lock()
+
+
 def _same_method(job: Job) -> Info:
     """The method of a job as this worker finds it, which must be the one that was planned."""
     try:
-        found = registry.infos(registry.import_origin(job.origin), "method")
+        with _importing:  # a worker may have several threads, and a module is there before all of it is
+            found = registry.infos(registry.import_origin(job.origin), "method")
     except Exception as error:  # a plug-in may fail in any way
         raise InputError(f"the dask worker on {_host()} cannot import {job.origin}: {error}") from error
     method = next((info for info in found if info.name == job.method), None)
