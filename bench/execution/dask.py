@@ -248,7 +248,9 @@ class _Dispatch:
         self.supervisor = supervisor
         self.workers = workers
         self.waiting = waiting
-        self.suspects: deque[Cell] = deque()  # workers have died under their chunk; each goes alone
+        self.suspects: deque[Cell] = deque()  # workers have died under their chunk: each gets a chunk of its own
+        self.accused: deque[Cell] = deque()  # and under that one: each gets the cluster for itself, at the end
+        self.on_trial = False
         self.running: dict[Chunk, list[Cell]] = {}
         self.completed = as_completed(loop=client.loop)
         self.submitted = 0
@@ -266,15 +268,19 @@ class _Dispatch:
         slots = max(sum(self.client.nthreads().values()), self.workers)
         while len(self.running) < AHEAD * slots and (self.suspects or self.waiting):
             if self.suspects:
-                cells = [self.suspects.popleft()]
+                self._start([self.suspects.popleft()])
             else:
-                cells = [self.waiting.popleft() for _ in range(self._size(slots))]
-            self.submitted += 1
-            jobs = [cell.job for cell in cells]
-            key = f"{self.supervisor.name}-{self.submitted}"
-            future = self.client.submit(run_chunk, self.supervisor.name, jobs, key=key)
-            self.running[future] = cells
-            self.completed.add(future)
+                self._start([self.waiting.popleft() for _ in range(self._size(slots))])
+        if not self.running and self.accused:
+            self.on_trial = True
+            self._start([self.accused.popleft()])
+
+    def _start(self, cells: list[Cell]) -> None:
+        self.submitted += 1
+        key = f"{self.supervisor.name}-{self.submitted}"
+        future = self.client.submit(run_chunk, self.supervisor.name, [cell.job for cell in cells], key=key)
+        self.running[future] = cells
+        self.completed.add(future)
 
     def _size(self, slots: int) -> int:
         """As many jobs as fit into a chunk's time, judged by those before, but so few that all workers get some."""
@@ -299,13 +305,15 @@ class _Dispatch:
             yield from zip(cells, records, strict=False)
 
     def _after_deaths(self, cells: list[Cell], deaths: int) -> Iterator[Finished]:
-        """Keep what was done; a job that was alone is taken for the cause, of others each is tried alone."""
+        """Keep what was done. A job is the cause only where nothing else was running, on any thread of any worker."""
         for cell in cells:
             record = self.supervisor.record(cell.job)
-            if record is None and len(cells) > 1:
-                self.suspects.append(cell)
+            if record is not None:
+                yield cell, record
+            elif self.on_trial:
+                yield cell, self._crashed(cell, deaths)
             else:
-                yield cell, record or self._crashed(cell, deaths)
+                (self.suspects if len(cells) > 1 else self.accused).append(cell)
 
     def _crashed(self, cell: Cell, deaths: int) -> dict[str, Any]:
         ended = Outcome(outcome.CRASHED, f"{deaths} dask workers died while running it")
