@@ -112,7 +112,7 @@ def _job(store: Store, job_id: str) -> Job:
     record = store.record(job_id)
     try:
         assert record is not None
-        return Job(**{name: record["job"][name] for name in Job.__slots__})
+        return Job(**record["job"])
     except UNREADABLE as error:
         raise InputError(f"{type(error).__name__} {error}") from error
 

@@ -171,6 +171,11 @@ def _absence(dataset: str, names: Sequence[str], command: str) -> str:
     return f"{what} not on disk{which}; get {'them' if len(names) > 1 else 'it'} with: {command}"
 
 
+def instance_key(dataset: Info, configured: Any, source: Source) -> str:
+    """Identity of an instance: its dataset with every parameter, its name and what determines its bytes."""
+    return digest([dataset.name, parameters_of(configured), source.name, source.revision])
+
+
 def _cells_of(
     source: Source,
     dataset: Info,
@@ -182,15 +187,15 @@ def _cells_of(
     rounds: int,
 ) -> list[Cell]:
     """Cells of one instance. On data that no seed changes, a deterministic method needs one seed only."""
-    key = digest([dataset.name, parameters_of(configured), source.name, source.revision])
+    key = instance_key(dataset, configured, source)
     cells = []
     for info, parameters in methods:
         configured_method = info.configure(parameters)
         repeated = not source.seeded and not info.fact("deterministic", configured_method)
-        complete = parameters_of(configured_method)
+        complete, source_hash = parameters_of(configured_method), info.source_hash
         for method_seed in range(seeds) if repeated else (seed,):
             timed = [rounds] if rounds else []
-            identity = digest([IDENTITY, key, info.name, complete, info.source_hash, method_seed, *timed])
+            identity = digest([IDENTITY, key, info.name, complete, source_hash, method_seed, *timed])
             job = Job(
                 identity,
                 label,
@@ -202,6 +207,8 @@ def _cells_of(
                 parameters,
                 method_seed,
                 rounds,
+                source_hash,
+                dataset.origin,
             )
             cells.append(Cell(job, source, info))
     return cells

@@ -22,6 +22,8 @@ class Job:
         Seed of the run.
     rounds
         How often a timing run times it; zero for the job of an ordinary run.
+    source_hash, dataset_origin
+        Hash of the method's source, and the module or file that the dataset is in.
     """
 
     id: str
@@ -34,6 +36,8 @@ class Job:
     parameters: Mapping[str, Any]
     seed: int
     rounds: int = 0
+    source_hash: str = ""
+    dataset_origin: str = ""
 
     @property
     def cell(self) -> tuple[str, str, str, str, int]:
@@ -77,12 +81,12 @@ def newest(plans: Sequence[Plan]) -> list[Job]:
 
 def encode(plan: Plan) -> dict[str, Any]:
     """As JSON: instances and configured methods once each, jobs as columns that refer to them."""
-    instances: dict[tuple[str, str, str], int] = {}
-    methods: dict[tuple[str, str, str, str], int] = {}
+    instances: dict[tuple[str, ...], int] = {}
+    methods: dict[tuple[str, ...], int] = {}
     columns: dict[str, list[Any]] = {name: [] for name in ("id", "instance", "method", "seed", "rounds")}
     for job in plan.jobs:
-        instance = (job.dataset, job.instance, job.instance_key)
-        method = (job.method, job.title, job.origin, json.dumps(dict(job.parameters)))
+        instance = (job.dataset, job.instance, job.instance_key, job.dataset_origin)
+        method = (job.method, job.title, job.origin, job.source_hash, json.dumps(dict(job.parameters)))
         columns["id"].append(job.id)
         columns["instance"].append(instances.setdefault(instance, len(instances)))
         columns["method"].append(methods.setdefault(method, len(methods)))
@@ -108,20 +112,23 @@ def decode(content: Mapping[str, Any]) -> Plan:
         Where it is something else.
     """
     columns = content["jobs"]
-    places = _picked([_strings(entry, 3) for entry in content["instances"]], columns["instance"])
+    places = _picked([_strings(entry, 4) for entry in content["instances"]], columns["instance"])
     methods = _picked([_method(*entry) for entry in content["methods"]], columns["method"])
     ids = _keys(_strings(columns["id"], len(columns["id"])))
-    _keys([key for _, _, key in content["instances"]])
+    _keys([key for _, _, key, _ in content["instances"]])
     rows = zip(ids, places, methods, columns["seed"], columns["rounds"], strict=True)
-    jobs = tuple(Job(key, *(*place, *method, int(seed), int(rounds))) for key, place, method, seed, rounds in rows)
+    jobs = tuple(
+        Job(*(key, *place[:3], *method[:4], int(seed), int(rounds), method[4], place[3]))
+        for key, place, method, seed, rounds in rows
+    )
     missing = _strings(content["missing"], len(content["missing"]))
     suite, command, baseline = _strings([content[name] for name in ("suite", "command", "baseline")], 3)
     return Plan(suite, jobs, missing, command, baseline)
 
 
-def _method(name: str, title: str, origin: str, parameters: Any) -> Any:
-    _strings([name, title, origin], 3)
-    return name, title, origin, dict(parameters)
+def _method(name: str, title: str, origin: str, source_hash: str, parameters: Any) -> Any:
+    _strings([name, title, origin, source_hash], 4)
+    return name, title, origin, dict(parameters), source_hash
 
 
 def _picked(entries: Sequence[Any], chosen: Iterable[int]) -> list[Any]:

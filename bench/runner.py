@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from bench import budget, experiment, registry
 from bench.errors import InputError
@@ -20,7 +20,11 @@ from bench.plan import Plan
 from bench.selection import format_selection
 from bench.store import Store
 
+if TYPE_CHECKING:
+    from bench.execution.dask import DaskEngine
+
 Rerun = Literal["never", "failed", "always"]
+Engine = Literal["local", "dask"]
 RUNS_FOLDER = Path("results", "runs")
 
 
@@ -49,6 +53,12 @@ class Options:
         Time the jobs one after another on one core, in rounds; see `bench.execution.timing`.
     rounds
         Override the suite's.
+    engine
+        "local" for child processes of this one, "dask" for the workers of a dask cluster, which must see the run's
+        folder and the plug-in files under the same paths.
+    scheduler
+        Address of a running dask scheduler; without one the dask engine starts a cluster of its own on this machine,
+        with `jobs` worker processes.
     plugins
         Files with more methods and datasets; when no methods are named, their methods join the suite's.
     """
@@ -65,6 +75,8 @@ class Options:
     rerun: Rerun = "never"
     timing: bool = False
     rounds: int | None = None
+    engine: Engine = "local"
+    scheduler: str | None = None
     plugins: tuple[Path, ...] = ()
 
 
@@ -93,6 +105,7 @@ class Run:
         options: Options | None = None,
     ) -> None:
         self.options = options = options or Options()
+        _check_engine(options)
         self.experiment = _resolved(suite, methods, datasets, options)
         if not self.experiment.cells:
             raise NothingToRunError(self.experiment.missing)
@@ -158,14 +171,18 @@ class Run:
 
     def execute(self) -> Iterator[Finished]:
         """Run what is not done; yield each cell with its record as it is stored."""
-        engine: LocalEngine | TimingEngine
-        if self.options.timing:
-            engine = TimingEngine(self.store, self.limits, self.threads)
-        else:
-            workers = self.options.jobs or os.cpu_count() or 1
-            engine = LocalEngine(self.store, self.limits, workers, self.threads)
-        with contextlib.closing(engine.run(self.todo)) as finished:
+        with contextlib.closing(self._engine().run(self.todo)) as finished:
             yield from finished
+
+    def _engine(self) -> "LocalEngine | TimingEngine | DaskEngine":
+        workers, threads = self.options.jobs or os.cpu_count() or 1, self.threads
+        if self.options.timing:
+            return TimingEngine(self.store, self.limits, threads)
+        if self.options.engine == "dask":
+            from bench.execution.dask import DaskEngine
+
+            return DaskEngine(self.store, self.limits, workers, threads, self.options.scheduler)
+        return LocalEngine(self.store, self.limits, workers, threads)
 
 
 def _resolved(
@@ -219,6 +236,19 @@ def _limits(options: Options) -> dict[str, Any]:
         raise InputError(f"--budget stands for {alone[0]} too; give one of them")
     limits = budget.parse(options.budget)
     return {"budget": limits.name, "timeout_s": limits.seconds, "memory_gib": limits.memory_gib}
+
+
+def _check_engine(options: Options) -> None:
+    if options.engine == "dask":
+        if options.timing:
+            raise InputError("--timing measures on this machine, one job at a time; leave out --engine dask")
+        try:
+            import distributed  # noqa: F401
+        except ImportError as error:
+            hint = "python -m pip install 'rotsync-bench[dask]'"
+            raise InputError(f"--engine dask needs the package distributed; get it with: {hint}") from error
+    elif options.scheduler is not None:
+        raise InputError("--scheduler is the address of a dask scheduler; add --engine dask")
 
 
 def _check_kind(store: Store, timing: bool) -> None:

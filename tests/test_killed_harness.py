@@ -16,9 +16,10 @@ import pandas as pd
 import psutil
 import pytest
 
+from bench.plan import Job
 from bench.results import score
 from bench.runner import Options, Run
-from bench.store import Job, Store
+from bench.store import Store
 
 KILLS = int(os.environ.get("BENCH_KILLS", "4"))
 PLUGIN = Path(__file__).with_name("chaos_plugin.py")

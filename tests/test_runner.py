@@ -128,7 +128,7 @@ def test_a_record_tells_where_it_comes_from(faulty_plugin: Path, tmp_path: Path)
     assert record["job"]["seed"] == 0
     assert {"numpy", "scipy"} <= set(record["versions"])
     assert {"python", "cpu", "command", "git"} <= set(record["provenance"])
-    assert record["limits"] == {"seconds": 30.0, "memory_gib": 4}
+    assert record["limits"] == {"seconds": 30.0, "memory_gib": 4, "threads": 1}
 
 
 @pytest.mark.parametrize(

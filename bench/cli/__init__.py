@@ -8,7 +8,7 @@ import sys
 
 import typer
 
-from bench.cli import check, data, doctor, list_, merge, new, paper, plot, run, solve, table
+from bench.cli import check, data, doctor, list_, merge, new, paper, plot, rerun, run, solve, table
 
 REFUSED = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
@@ -20,6 +20,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("run", epilog=run.EPILOG)(run.run)
+app.command("rerun")(rerun.rerun)
 app.command("list")(list_.list_)
 app.command("table")(table.table)
 app.command("plot")(plot.plot)

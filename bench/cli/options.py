@@ -31,6 +31,13 @@ class Rerun(StrEnum):
     ALWAYS = "always"
 
 
+class Engine(StrEnum):
+    """What places the jobs."""
+
+    LOCAL = "local"
+    DASK = "dask"
+
+
 class Format(StrEnum):
     """How a table is written."""
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, DataDirOption, PluginOption, ProtocolOption, Rerun
+from bench.cli.options import Align, AlignOption, DataDirOption, Engine, PluginOption, ProtocolOption, Rerun
 from bench.cli.progress import execute
 
 if TYPE_CHECKING:
@@ -57,6 +57,13 @@ def run(
     ] = False,
     rounds: Annotated[int | None, typer.Option(metavar="N", help="Rounds of a timing run.  [default: 5]")] = None,
     rerun: Annotated[Rerun, typer.Option(help="Which finished jobs are run again.")] = Rerun.NEVER,
+    engine: Annotated[
+        Engine, typer.Option(help="Where jobs run: children of this process, or the workers of a dask cluster.")
+    ] = Engine.LOCAL,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Of a dask scheduler, tcp://…  [default: a cluster on this machine]"),
+    ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run, and run nothing.")] = False,
     plugin: PluginOption = None,
 ) -> None:
@@ -82,6 +89,8 @@ def run(
         rerun=rerun.value,
         timing=timing,
         rounds=rounds,
+        engine=engine.value,
+        scheduler=scheduler,
         plugins=tuple(plugin or ()),
     )
     planned = Run(suite, method or (), dataset or (), options)

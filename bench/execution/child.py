@@ -106,7 +106,7 @@ def run(request: Request, prepared: Prepared | None = None) -> None:
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            ended = _solve(request, prepared or prepare(request), result)
+            ended = solve(request, prepared or prepare(request), result)
         result["warnings"] = sorted({f"{w.category.__name__}: {w.message}" for w in caught})
     except Skipped as skip:
         ended = Outcome(outcome.SKIPPED, str(skip))
@@ -121,7 +121,8 @@ def run(request: Request, prepared: Prepared | None = None) -> None:
     temporary.replace(Path(request.folder, RESULT_FILE))
 
 
-def _solve(request: Request, prepared: Prepared, result: dict[str, Any]) -> Outcome:
+def solve(request: Request, prepared: Prepared, result: dict[str, Any]) -> Outcome:
+    """Run the job, write its estimate and fill in `result`; whatever the method raises comes through."""
     info, method, problem = prepared.info, prepared.method, prepared.problem
     limit = info.fact("max_cameras", method)
     if limit is not None and problem.n > limit:

@@ -65,6 +65,7 @@ def record_of(
     job: Mapping[str, Any],
     requires: tuple[str, ...],
     limits: Limits,
+    threads: int,
     ended: Outcome,
     report: Mapping[str, Any],
 ) -> dict[str, Any]:
@@ -75,7 +76,7 @@ def record_of(
         "outcome": ended.kind,
         "status": ended.text,
         "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-        "limits": {"seconds": limits.seconds, "memory_gib": limits.memory_gib} | budget,
+        "limits": {"seconds": limits.seconds, "memory_gib": limits.memory_gib, "threads": threads} | budget,
         "versions": provenance.versions(requires),
         "provenance": provenance.of_this_run(),
         **report,

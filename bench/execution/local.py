@@ -1,7 +1,7 @@
 """The local engine: threads that each supervise one child at a time."""
 
 import threading
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import asdict
 from pathlib import Path
@@ -15,6 +15,8 @@ from bench.execution.launch import Launcher
 from bench.execution.outcome import Outcome
 from bench.execution.supervise import Interrupted, Limits
 from bench.experiment import Cell
+from bench.plan import Job
+from bench.registry import Info
 from bench.store import Store
 
 Finished = tuple[Cell, dict[str, Any]]
@@ -67,23 +69,47 @@ class LocalEngine:
             self.folders.close()
 
     def _run_one(self, cell: Cell) -> Finished:
-        job = cell.job
         if self.stop.is_set():
             raise Interrupted
-        if cell.method.not_installed:
-            return not_installed(cell, self.store, self.limits)
-        requires = cell.method.requires
-        with self.folders.empty() as work:
-            request = request_of(cell, self.store, work, self.threads)
-            ended, report = execute(request, requires, self.launcher, self.limits, self.stop)
-            record = record_of(asdict(job), requires, self.limits, ended, report)
-            self.store.add_record(job.id, record, work / ESTIMATE_FILE if ended.kind == outcome.OK else None)
-        return cell, record
+        return cell, run_job(cell.job, cell.method, self.folders, self.launcher, self.limits, self.threads, self.stop)
 
 
-def request_of(cell: Cell, store: Store, folder: Path, threads: int) -> Request:
-    """What the child of a cell is told; its results go to `folder`."""
-    job = cell.job
+def run_job(
+    job: Job,
+    method: Info,
+    folders: WorkFolders,
+    launcher: Launcher,
+    limits: Limits,
+    threads: int,
+    stop: threading.Event,
+    told: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Run one job in a supervised child and keep its record, which is returned; what every engine does.
+
+    Parameters
+    ----------
+    told
+        Facts of the record's provenance that this process cannot know.
+
+    Raises
+    ------
+    Interrupted
+        Once `stop` is set; no record is kept then.
+    """
+    store = folders.store
+    if method.not_installed:
+        return not_installed(job, method, store, limits, threads)
+    with folders.empty() as work:
+        request = request_of(job, store, work, threads)
+        ended, report = execute(request, method.requires, launcher, limits, stop)
+        record = record_of(asdict(job), method.requires, limits, threads, ended, report)
+        record["provenance"] = record["provenance"] | (told or {})
+        store.add_record(job.id, record, work / ESTIMATE_FILE if ended.kind == outcome.OK else None)
+    return record
+
+
+def request_of(job: Job, store: Store, folder: Path, threads: int) -> Request:
+    """What the child of a job is told; its results go to `folder`."""
     return Request(
         problem=str(store.problem_path(job.instance_key).resolve()),
         origin=job.origin,
@@ -95,9 +121,9 @@ def request_of(cell: Cell, store: Store, folder: Path, threads: int) -> Request:
     )
 
 
-def not_installed(cell: Cell, store: Store, limits: Limits) -> Finished:
-    """Keep a record that says what a method lacks, and how to get it."""
-    hint = Outcome(outcome.NOT_INSTALLED, cell.method.install_hint)
-    record = record_of(asdict(cell.job), (), limits, hint, {})
-    store.add_record(cell.job.id, record, None)
-    return cell, record
+def not_installed(job: Job, method: Info, store: Store, limits: Limits, threads: int) -> dict[str, Any]:
+    """Keep a record, which is returned, that says what a method lacks, and how to get it."""
+    hint = Outcome(outcome.NOT_INSTALLED, method.install_hint)
+    record = record_of(asdict(job), (), limits, threads, hint, {})
+    store.add_record(job.id, record, None)
+    return record

@@ -66,7 +66,7 @@ class TimingEngine:
             timed = []
             for cell in cells:
                 if cell.method.not_installed:
-                    yield not_installed(cell, self.store, self.limits)
+                    yield cell, not_installed(cell.job, cell.method, self.store, self.limits, self.threads)
                 else:
                     timed.append(_Timed(cell, stack.enter_context(self.store.work_folder())))
             for number in range(max((cell.job.rounds for cell in cells), default=0)):
@@ -79,7 +79,7 @@ class TimingEngine:
     def _run_round(self, job: "_Timed") -> None:
         folder = job.folder / str(len(job.round_s))
         folder.mkdir()
-        request = request_of(job.cell, self.store, folder, self.threads)
+        request = request_of(job.cell.job, self.store, folder, self.threads)
         request = replace(request, core=self.core, repeat_s=REPEAT_S)
         ended, report = execute(request, job.cell.method.requires, self.launcher, self.limits, self.stop)
         if ended.kind == outcome.OK:
@@ -93,7 +93,8 @@ class TimingEngine:
         if job.ended.kind == outcome.OK:
             report |= {"solve_s": median(job.round_s), "min_s": min(job.round_s)}
             report |= {"round_s": job.round_s, "waited": job.waited}
-        record = record_of(asdict(job.cell.job), job.cell.method.requires, self.limits, job.ended, report)
+        requires = job.cell.method.requires
+        record = record_of(asdict(job.cell.job), requires, self.limits, self.threads, job.ended, report)
         estimate = job.folder / "0" / ESTIMATE_FILE
         self.store.add_record(job.cell.job.id, record, estimate if job.ended.kind == outcome.OK else None)
         return record
