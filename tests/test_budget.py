@@ -50,7 +50,7 @@ def test_a_budget_is_held_and_stored(faulty_plugin: Path, tmp_path: Path) -> Non
     run = planned(faulty_plugin, tmp_path / "run", budget="2c-20s-1g")
     run.prepare()
     ((_, record),) = run.execute()
-    assert record["limits"] == {"seconds": 20.0, "memory_gib": 1.0, "budget": "2c-20s-1g"}
+    assert record["limits"] == {"seconds": 20.0, "memory_gib": 1.0, "threads": 2, "budget": "2c-20s-1g"}
     assert record["threads"] == 2
 
 

@@ -72,7 +72,7 @@ def test_a_plan_cannot_lead_out_of_its_folder(key: str) -> None:
     with pytest.raises(ValueError, match="letters and digits"):
         decode(content | {"jobs": content["jobs"] | {"id": [key]}})
     with pytest.raises(ValueError, match="letters and digits"):
-        decode(content | {"instances": [["toy", "toy3", key]]})
+        decode(content | {"instances": [["toy", "toy3", key, ""]]})
 
 
 def test_a_folder_of_the_first_layout_is_brought_up_to_date(store: Store, tmp_path: Path) -> None:
