@@ -145,6 +145,7 @@ def _collect(
         {
             "dataset": dataset,
             "instance": job.instance,
+            "instance_key": job.instance_key,
             "method": job.method,
             "title": job.title,
             "params": method[1],

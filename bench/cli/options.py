@@ -2,9 +2,12 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from bench.reporting.appearance import Appearance
 
 
 class Align(StrEnum):
@@ -52,6 +55,22 @@ PluginOption = Annotated[
 DataDirOption = Annotated[
     Path | None, typer.Option("--data-dir", metavar="DIR", help="Folder where data are looked for first.")
 ]
+StyleOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--style", metavar="FILE", help="TOML file of fonts, colours and names.  [default: bench-style.toml, if there]"
+    ),
+]
+
+
+def appearance_of(given: Path | None) -> "Appearance":
+    """How tables and figures are to look; says on standard error which file said so."""
+    from bench.reporting.appearance import find
+
+    wanted, path = find(given)
+    if path:
+        typer.echo(f"style: {path}", err=True)
+    return wanted
 
 
 def run_folder(given: Path) -> Path:

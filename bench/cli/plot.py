@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, ProtocolOption, RunFolder, run_folder
+from bench.cli.options import Align, AlignOption, ProtocolOption, RunFolder, StyleOption, appearance_of, run_folder
 
 
 def plot(
@@ -13,13 +13,30 @@ def plot(
     align: AlignOption = Align.L1,
     protocol: ProtocolOption = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for the plots.  [default: RUN/plots]")] = None,
+    style: StyleOption = None,
+    width: Annotated[
+        str | None,
+        typer.Option(metavar="W", help="Figures for a paper: single (3.5 in), double (7.16 in) or inches."),
+    ] = None,
 ) -> None:
-    """Draw error per scene, cumulative errors and error against time as PNG, PDF and SVG."""
+    """Draw every figure that a run has data for as PNG, PDF and SVG.
+
+    Error per scene, cumulative errors, error against time; with two problems or more rank probabilities, the critical
+    difference and performance profiles too. With --width, title and caption are not drawn but written to
+    captions.tex.
+    """
+    from dataclasses import replace
+
+    from bench.reporting.appearance import using, width_in
     from bench.reporting.present import write_plots
     from bench.results import score
     from bench.store import Store
 
+    wanted = appearance_of(style)
+    if width is not None:
+        wanted = replace(wanted, width_in=width_in(width))
     folder = run_folder(run)
     results = score(Store.open(folder), align.value, protocol.value if protocol else None, checkpoints=True)
-    for path in write_plots(results, out or folder / "plots"):
-        typer.echo(path)
+    with using(wanted):
+        for path in write_plots(results, out or folder / "plots"):
+            typer.echo(path)

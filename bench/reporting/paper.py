@@ -12,7 +12,8 @@ from bench.papers.properties import PropertyTable
 from bench.papers.published import FACTS
 from bench.papers.scenes import NO_TRUTH, NOT_ON_DISK, PUBLISHED_ONLY, SceneTable
 from bench.reporting.console import render_grid
-from bench.reporting.grid import ABBREVIATIONS, ABSENT, UNKNOWN, Cell, Grid, abbreviated, gathered, latex, markdown
+from bench.reporting.grid import ABBREVIATIONS, ABSENT, UNKNOWN, Cell, Grid, abbreviated, gathered, markdown
+from bench.reporting.latex import latex
 from bench.reporting.rows import OK, degrees
 
 HEADS = {"n_cameras": "Cameras", "edges_percent": "Edges %", "hardness": "Hardness"}
