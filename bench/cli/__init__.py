@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from bench.cli import check, data, list_, new, paper, plot, run, solve, table
+from bench.cli import bibtex, check, compare, data, list_, new, paper, plot, run, solve, table
 
 app = typer.Typer(
     name="bench",
@@ -20,7 +20,9 @@ app.command("run", epilog=run.EPILOG)(run.run)
 app.command("list")(list_.list_)
 app.command("table")(table.table)
 app.command("plot")(plot.plot)
+app.command("compare")(compare.compare)
 app.command("paper")(paper.paper)
+app.command("bibtex")(bibtex.bibtex)
 app.add_typer(data.app, name="data")
 app.command("solve")(solve.solve)
 app.command("new")(new.new)

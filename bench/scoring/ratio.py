@@ -4,7 +4,7 @@ Ratios are averaged as logarithms, so that a hard problem weighs no more than an
 undoes one of two.
 """
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,7 +24,7 @@ from bench.scoring.resampling import (
 )
 from bench.scoring.statistics import MIN_CAMERAS
 
-Verdict = Literal["better", "worse", "cannot be told", "identical"]
+Verdict = Literal["better", "worse", "cannot be told"]
 
 
 @dataclass(frozen=True)
@@ -98,9 +98,9 @@ def time_ratio(new_s: Floats, old_s: Floats) -> Ratio:
     return _exponential(found.mean, found.low, found.high, found.p_below, found.p_above)
 
 
-def mean_ratio(ratios: Mapping[object, Ratio]) -> Ratio:
+def mean_ratio(ratios: Sequence[Ratio]) -> Ratio:
     """Geometric mean of the ratios on several problems, by Student's t over the problems; one problem's as it is."""
-    known = [ratio for ratio in ratios.values() if np.isfinite(ratio.value)]
+    known = [ratio for ratio in ratios if np.isfinite(ratio.value)]
     if len(known) < 2:
         return known[0] if known else Ratio(float("nan"))
     logs = np.log([ratio.value for ratio in known])

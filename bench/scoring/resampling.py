@@ -1,6 +1,6 @@
 """Resampling errors over seeds and cameras, and how much of their spread is whose."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -21,6 +21,14 @@ CENTRES: dict[Statistic, Centre] = {"mean": np.mean, "median": np.median}
 def log_of(centre: Centre) -> Centre:
     """The logarithm of a centre, in degrees, above `FLOOR_DEG`."""
     return lambda values, axis: np.log(np.maximum(centre(values, axis), FLOOR_DEG))
+
+
+def padded(errors: Sequence[Floats]) -> Floats:
+    """(seeds, cameras) of one array (n,) a seed, with NaN where the instances of the seeds differ in size."""
+    out = np.full((len(errors), max(map(len, errors))), np.nan)
+    for row, own in zip(out, errors, strict=True):
+        row[: len(own)] = own
+    return out
 
 
 def seed_scores(table: Floats, centre: Centre) -> Floats:
