@@ -2,12 +2,9 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from bench.reporting.appearance import Appearance
 
 
 class Align(StrEnum):
@@ -63,14 +60,18 @@ StyleOption = Annotated[
 ]
 
 
-def appearance_of(given: Path | None) -> "Appearance":
-    """How tables and figures are to look; says on standard error which file said so."""
-    from bench.reporting.appearance import find
+def wear(given: Path | None = None, width: str | None = None) -> None:
+    """Put a style file in force, saying on standard error which; and a width of figures."""
+    from dataclasses import replace
+
+    from bench.reporting.appearance import find, put_in_force, width_in
 
     wanted, path = find(given)
     if path:
         typer.echo(f"style: {path}", err=True)
-    return wanted
+    if width is not None:
+        wanted = replace(wanted, width_in=width_in(width))
+    put_in_force(wanted)
 
 
 def run_folder(given: Path) -> Path:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, ProtocolOption, RunFolder, StyleOption, appearance_of, run_folder
+from bench.cli.options import Align, AlignOption, ProtocolOption, RunFolder, StyleOption, run_folder, wear
 
 
 def plot(
@@ -25,18 +25,12 @@ def plot(
     difference and performance profiles too. With --width, title and caption are not drawn but written to
     captions.tex.
     """
-    from dataclasses import replace
-
-    from bench.reporting.appearance import using, width_in
     from bench.reporting.present import write_plots
     from bench.results import score
     from bench.store import Store
 
-    wanted = appearance_of(style)
-    if width is not None:
-        wanted = replace(wanted, width_in=width_in(width))
+    wear(style, width)
     folder = run_folder(run)
     results = score(Store.open(folder), align.value, protocol.value if protocol else None, checkpoints=True)
-    with using(wanted):
-        for path in write_plots(results, out or folder / "plots"):
-            typer.echo(path)
+    for path in write_plots(results, out or folder / "plots"):
+        typer.echo(path)

@@ -101,9 +101,14 @@ def current() -> Appearance:
     return _IN_FORCE.get() or Appearance()
 
 
+def put_in_force(appearance: Appearance) -> None:
+    """Have everything that this process draws look so."""
+    _IN_FORCE.set(appearance)
+
+
 @contextmanager
 def using(appearance: Appearance) -> Iterator[None]:
-    """Put an appearance in force."""
+    """Put an appearance in force for a while."""
     token = _IN_FORCE.set(appearance)
     try:
         yield

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from bench.problem import Floats
 from bench.reporting.ranking import ranking_figures
 from bench.reporting.rows import OK, Configured, Place, times_note
-from bench.reporting.style import GREY, Look, columns_of, describe, log_axis, looks, panels, save, styled
+from bench.reporting.style import GREY, Look, columns_of, describe, lines_of, log_axis, looks, panels, save, styled
 
 __all__ = ["cumulative_errors", "error_against_time", "error_per_scene", "figures", "save"]
 
@@ -49,7 +49,7 @@ def error_per_scene(frame: pd.DataFrame, errors: Errors) -> Figure:
     places = _scored(frame, errors)
     look = looks(frame)
     with styled():
-        figure, axes = panels(len(places), 2.3, 0.19 * len(look) + 0.55, ())
+        figure, axes = panels(len(places), 2.3, 0.19 * lines_of(look) * len(look) + 0.55, ())
         floored = False
         low = math.inf
         for ax, place in zip(axes, places, strict=True):

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from bench.reporting.rows import Configured, times_note
-from bench.reporting.style import GREY, Look, describe, log_axis, looks, panels, styled
+from bench.reporting.style import GREY, Look, describe, lines_of, log_axis, looks, panels, styled
 from bench.scoring.blocks import Blocks, blocks
 from bench.scoring.profiles import performance_profiles
 from bench.scoring.ranking import critical_difference, rank_frame
@@ -50,7 +50,7 @@ def rank_probabilities(frame: pd.DataFrame, table: Blocks) -> Figure:
     shares = found.filter(like="p_rank_").to_numpy()
     count = len(found)
     with styled():
-        figure, (ax,) = panels(1, 0.28 * count + 1.0, ROW * count + 0.3, ())
+        figure, (ax,) = panels(1, 0.28 * count + 1.0, ROW * lines_of(look) * count + 0.3, ())
         ax.pcolormesh(shares, cmap="Blues", vmin=0, vmax=1, edgecolors="white", linewidth=1.5)
         for (row, column), share in np.ndenumerate(shares):
             if share >= LABELLED:
@@ -79,7 +79,7 @@ def critical_differences(frame: pd.DataFrame, table: Blocks) -> Figure:
     half = math.ceil(count / 2)
     lanes = len(found.groups)
     with styled():
-        figure, (ax,) = panels(1, 3.2, ROW * (half + 0.6 * lanes) + 0.7, ())
+        figure, (ax,) = panels(1, 3.2, ROW * lines_of(look) * (half + 0.6 * lanes) + 0.7, ())
         best, worst = 1.0, float(count)
         ax.set(xlim=(best, worst), ylim=(-(half + 0.6 * lanes + 1.2), 1.6))
         ax.xaxis.tick_top()

@@ -2,7 +2,7 @@
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +42,7 @@ SETTINGS: dict[Any, Any] = {
     "savefig.dpi": 200,
 }
 LEGEND_LINE = 0.17  # inches
+LABEL = 24  # characters of a line
 MOST_COLUMNS = 3
 NARROWEST_PANEL = 2.0  # inches
 
@@ -68,13 +69,19 @@ def looks(frame: pd.DataFrame) -> dict[Configured, Look]:
     for k, ((method, params), head) in enumerate(zip(keys, heads, strict=True)):
         own = wanted.of(method, params)
         turn = k // len(colors)
+        label = head if heads.count(head) == 1 else f"{head} [{method}]"
         out[method, params] = Look(
-            label=head if heads.count(head) == 1 else f"{head} [{method}]",
+            label="\n".join(textwrap.wrap(label.replace(",", ", "), LABEL)) if wanted.width_in else label,
             color=own.color or colors[k % len(colors)],
             line=own.line or LINES[turn % len(LINES)],
             marker=own.marker or MARKERS[(k + turn) % len(MARKERS)],
         )
     return out
+
+
+def lines_of(look: Mapping[Configured, Look]) -> int:
+    """Lines of the tallest label: in a figure for a paper long ones are wrapped."""
+    return max((style.label.count("\n") + 1 for style in look.values()), default=1)
 
 
 @contextmanager
@@ -106,10 +113,12 @@ def panels(count: int, width: float, height: float, legend: Sequence[Line2D]) ->
     columns = columns_of(count)
     rows = math.ceil(count / columns)
     tall = rows * height + 0.7
-    longest = 0.055 * max((len(str(handle.get_label())) for handle in legend), default=0) + 0.5
+    labels = [str(handle.get_label()) for handle in legend]
+    longest = 0.055 * max((len(line) for label in labels for line in label.split("\n")), default=0) + 0.5
+    lines = max((label.count("\n") + 1 for label in labels), default=1)
     if fixed:
         legend_columns = max(1, int(fixed / longest))
-        wide, tall = fixed, tall - 0.5 + LEGEND_LINE * math.ceil(len(legend) / legend_columns)
+        wide, tall = fixed, tall - 0.5 + lines * LEGEND_LINE * math.ceil(len(legend) / legend_columns)
     else:
         legend_columns = math.ceil(len(legend) / max(1, int((tall - 0.5) / LEGEND_LINE)))
         wide = columns * width + 0.5 + legend_columns * longest * bool(legend)
