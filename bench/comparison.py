@@ -24,6 +24,7 @@ ALL = "all"
 NOWHERE: Place = ("", "", "")
 IDENTICAL = "identical"
 NEITHER = (np.nan, np.nan)
+LEVELS = 3  # that a verdict is given at: all, method and scene
 STATISTICS: tuple[Statistic, ...] = ("median", "mean")
 TIME = "time"
 COLUMNS = (
@@ -57,7 +58,7 @@ class Comparison:
     rows
         `COLUMNS`; level "all" is everything together, "method" a method over its scenes, "scene" a method on a scene. A
         quantity is "median", "mean" or "time"; `ratio` is new to old, with its 95 % interval; `p_holm` is corrected
-        for all rows of the level.
+        for all rows.
     outcomes
         Jobs that ended otherwise, or with other cameras solved.
     cells
@@ -103,7 +104,7 @@ def compare(old: Results, new: Results, threshold: float = 1.05, *, no_times: st
 
     Errors are compared where both ended well: on a scene by a paired bootstrap over cameras and Student's t over
     seeds, over scenes by Student's t on the logarithms of the scenes' ratios. The p values of a level are corrected
-    together (Holm). A method can be worse on one scene and not over all.
+    together (Holm), then for the number of levels. A method can be worse on one scene and not over all.
 
     Parameters
     ----------
@@ -239,8 +240,8 @@ def _geometric(values: Sequence[float]) -> float:
 
 def _judged(level: str, found: Mapping[_Key, _Compared], threshold: float) -> Iterator[Row]:
     p_values = holm([np.nan if one.same else one.ratio.p_value for one in found.values()])
-    for ((place, (method, params), quantity), one), p in zip(found.items(), p_values, strict=True):
-        ratio = one.ratio
+    for ((place, (method, params), quantity), one), of_level in zip(found.items(), p_values, strict=True):
+        ratio, p = one.ratio, float(np.minimum(LEVELS * of_level, 1))
         verdict = IDENTICAL if one.same else ratio.verdict(p, threshold)
         head = (level, *place, method, params, quantity)
         values = (one.old, one.new, ratio.value, ratio.low, ratio.high, ratio.p_value, p, verdict)

@@ -141,7 +141,7 @@ def test_the_papers_highlights_are_coloured() -> None:
     assert lines["Madrid Metropolis (a)"][3:5] == ["0.80", "0.50"]
     assert lines["Alamo"][3:6] == ["--", "--", "1.2"]
     assert r"\usepackage{xcolor}" in text
-    assert "Madrid Metropolis 176 cameras" in text
+    assert r"Madrid Metropolis: 176 cameras, 68 \% of edges, hardness 0.0319" in text
 
 
 def test_timing_runs_print_how_many_times_faster() -> None:

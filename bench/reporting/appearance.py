@@ -227,7 +227,7 @@ def _known(content: Mapping[str, Any], keys: "tuple[str, ...] | list[str]", wher
 
 def _check(fits: bool, where: str, key: str, wanted: str, value: Any) -> None:
     if not fits:
-        raise InputError(f"{where}: {f'{key} ' if key else ''}must be {wanted}, not {value!r}")
+        raise InputError(f"{where}{f': {key}' if key else ''} must be {wanted}, not {value!r}")
 
 
 def _is_number(value: Any) -> bool:

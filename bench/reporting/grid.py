@@ -184,11 +184,12 @@ def _notes(group: Sequence[Scene], cells: Sequence[str]) -> list[str]:
     notes = [f"Bold: {TIE_LEGEND}."] if any(e.best for scene in group for e in scene.entries) else []
     legend = {
         PARTIAL: "fewer cameras scored than by another method",
-        "(": "(k/s) only k of s seeds ended well",
         UNKNOWN: "solved, but no camera has ground truth",
         ABSENT: "not in this run, or no edge weights" if any(s.has_roc for s in group) else "not in this run",
     }
-    marks = [meaning if mark == "(" else f"{mark}: {meaning}" for mark, meaning in legend.items() if mark in text]
+    counted = re.search(r"\(\d+/\d+\)", text) is not None
+    marks = [f"{mark}: {meaning}" for mark, meaning in legend.items() if mark in text]
+    marks += ["(k/s): only k of s seeds ended well"] if counted else []
     if any(scene.has_roc for scene in group):
         marks.append(f"{ROC}: {ROC_LEGEND}")
     used = set(re.split(r"[ /]", text))

@@ -12,7 +12,7 @@ from bench.reporting.grid import ABSENT, Cell, Grid
 from bench.reporting.paper import HEADS, error_text, marks_of, scene_notes
 
 HERE, PAPER = "here", "paper"
-_DIGITS = {"n_cameras": 0, "edges_percent": 0, "hardness": 4}
+_FACTS = {"n_cameras": (0, "{} cameras"), "edges_percent": (0, "{} % of edges"), "hardness": (4, "hardness {}")}
 
 
 def side_by_side(table: SceneTable, frame: pd.DataFrame, computed: Computed, alignment: str) -> Grid:
@@ -75,11 +75,11 @@ def _cells(rows: "list[object]") -> Iterator[Cell]:
 
 def _facts(frame: pd.DataFrame) -> Iterator[str]:
     """Where what is known of a scene is not what was published."""
-    facts = frame[frame["quantity"].isin(FACTS)]
-    differing = []
-    for row in facts.itertuples():
-        digits = _DIGITS[row.quantity]
+    differing: dict[str, list[str]] = {}
+    for row in frame[frame["quantity"].isin(FACTS)].itertuples():
+        digits, text = _FACTS[row.quantity]
         if math.isfinite(row.measured) and row.published and round(row.measured, digits) != float(row.published):
-            differing.append(f"{row.scene} {row.measured:.{digits}f} {HEADS[row.quantity].lower()}")
+            differing.setdefault(row.scene, []).append(text.format(f"{row.measured:.{digits}f}"))
     if differing:
-        yield f"Cameras, edges and hardness are as published; {HERE}: {', '.join(differing)}."
+        scenes = "; ".join(f"{scene}: {', '.join(facts)}" for scene, facts in differing.items())
+        yield f"Cameras, edges and hardness are as published. {HERE.capitalize()} they are, {scenes}."

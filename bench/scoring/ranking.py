@@ -36,10 +36,8 @@ def rank_probabilities(blocks: Blocks) -> Floats:
     from scipy.stats import rankdata
 
     rng = np.random.default_rng(0)
-    own = ranks(blocks.values)
-    scene_of = np.asarray(blocks.scenes)
-    by_scene = [own[scene_of == scene] for scene in np.unique(scene_of)]
-    count = own.shape[1]
+    by_scene = _by_scene(blocks)
+    count = len(blocks.methods)
     drawn = np.zeros((RESAMPLES, count))
     for total in drawn:
         for scene in rng.integers(len(by_scene), size=len(by_scene)):
@@ -50,6 +48,12 @@ def rank_probabilities(blocks: Blocks) -> Floats:
     place = np.arange(1, count + 1)
     inside = (low <= place) & (place <= high)
     return np.asarray((inside / inside.sum(axis=2, keepdims=True)).mean(axis=0))
+
+
+def _by_scene(blocks: Blocks) -> list[Floats]:
+    """Ranks (problems, methods) of each scene."""
+    own, scene_of = ranks(blocks.values), np.asarray(blocks.scenes)
+    return [own[scene_of == scene] for scene in np.unique(scene_of)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,10 +181,10 @@ def _runs(together: "np.ndarray[tuple[int, int], np.dtype[np.bool_]]") -> list[t
 
 
 def rank_frame(blocks: Blocks) -> "pd.DataFrame":
-    """``method, params, mean_rank, p_rank_1 ... p_rank_k``, by mean rank: what a heat strip shows."""
+    """``method, params, mean_rank, p_rank_1 ... p_rank_k``, by mean rank over scenes: what a heat strip shows."""
     import pandas as pd
 
-    mean = ranks(blocks.values).mean(axis=0)
+    mean = np.mean([own.mean(axis=0) for own in _by_scene(blocks)], axis=0)
     probabilities = rank_probabilities(blocks)
     heads = [f"p_rank_{place}" for place in range(1, len(mean) + 1)]
     rows = [
