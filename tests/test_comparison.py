@@ -86,7 +86,7 @@ def test_worse_better_and_neither(scenes: int) -> None:
 
 
 def test_the_threshold_says_what_is_no_regression() -> None:
-    found = compare(scored({"a": 1.0}, 8), scored({"a": 1.2}, 8), threshold=1.3)
+    found = compare(scored({"a": 1.0}, 8), scored({"a": 1.2}, 8), threshold=1.5)
     assert verdicts(found) == {"a": {"cannot be told"}}
     assert not found.regressed
     assert compare(scored({"a": 1.0}, 8), scored({"a": 1.2}, 8), threshold=1.1).regressed
