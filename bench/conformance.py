@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from bench import so3
+from bench.bibliography import cite_keys, references
+from bench.errors import InputError
 from bench.execution import outcome
 from bench.execution.single import Answer, SingleSolver
 from bench.execution.supervise import Limits
@@ -124,6 +126,16 @@ def _exact_recovery(kit: _Kit) -> None:
     kit.recovers(*_exact(CAMERAS, _half_of_the_edges()))
 
 
+def _reference(kit: _Kit) -> None:
+    """Its key is in a bibliography."""
+    if not cite_keys(kit.info):
+        raise NotApplicable("declares no reference (cite=)")
+    try:
+        references(kit.info)
+    except InputError as error:
+        raise Failed(str(error)) from error
+
+
 def _disconnected_graph(kit: _Kit) -> None:
     """The largest component is solved, the rest is left out."""
     edges = [(i, j) for i in range(5) for j in range(i + 1, 5)] + [(5, 6)]
@@ -192,6 +204,7 @@ CHECKS: tuple[Callable[[_Kit], None], ...] = (
     _rotated_frames,
     _same_seed_same_answer,
     _deterministic_as_declared,
+    _reference,
 )
 
 

@@ -95,7 +95,7 @@ def score(
         jobs, scores = list(itertools.compress(jobs, fits)), scores.where(fits)
     frame = _frame(jobs, scores.table, rule)
     errors = CameraErrors(frame, scores)
-    ties = {place: _ties(errors, place, frame, jobs) for place in errors}
+    ties = {place: _ties(errors, place, frame) for place in errors}
     if "round_s" in frame:
         _compare_times(frame, plans[-1].baseline)
     curves: dict[Place, dict[Configured, list[Curve]]] = {}
@@ -153,6 +153,7 @@ def _frame(jobs: Sequence[Job], table: "pa.Table", rule: str) -> "pd.DataFrame":
         {
             "dataset": [datasets[job.dataset] for job in jobs],
             "instance": [job.instance for job in jobs],
+            "instance_key": [job.instance_key for job in jobs],
             "method": [job.method for job in jobs],
             "title": [job.title for job in jobs],
             "params": params,
@@ -243,9 +244,9 @@ def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
     }
 
 
-def _ties(errors: CameraErrors, place: Place, frame: "pd.DataFrame", jobs: Sequence[Job]) -> set[Configured]:
+def _ties(errors: CameraErrors, place: Place, frame: "pd.DataFrame") -> set[Configured]:
     rows = errors.rows[place]
-    same_cameras = len({jobs[k].instance_key for of_method in rows.values() for k in of_method}) == 1
+    same_cameras = frame["instance_key"].iloc[np.concatenate(list(rows.values()))].nunique() == 1
     if same_cameras or max(map(len, rows.values())) <= MANY_SEEDS:
         return tied(errors.of(place, MANY_SEEDS), same_cameras=same_cameras)
     columns = frame[["seed", "median_deg", "mean_deg", "n_scored"]].to_numpy(dtype=float)

@@ -19,7 +19,7 @@ SPHERE = "sphere2500"
 FOLDER = "pose_graphs"
 
 
-@dataset("pose-graph", title="Pose graphs")
+@dataset("pose-graph", title="Pose graphs", cite="kaess2008")
 @dataclass(frozen=True)
 class PoseGraph:
     """One pose graph: sphere2500 with its ground truth, or any g2o file without one.

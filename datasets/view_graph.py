@@ -18,7 +18,7 @@ FOLDER = "viewgraphs"
 NOTE = "simulated measurements: only who is connected to whom is real; do not compare with published tables"
 
 
-@dataset("view-graph", title="View graphs, simulated measurements")
+@dataset("view-graph", title="View graphs, simulated measurements", cite="wilson2014")
 @dataclass(frozen=True)
 class ViewGraph:
     """The topology of real scenes, at their size and connectivity, with simulated measurements.

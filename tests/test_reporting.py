@@ -9,7 +9,7 @@ from rich.console import Console
 from bench.errors import InputError
 from bench.reporting import plots, style, tables
 from bench.reporting.console import console_blocks
-from bench.reporting.grid import latex_escape
+from bench.reporting.latex import latex_escape
 from bench.scoring.errors import summary
 
 HOSTILE = "a_b%&<script>|$x$#{}\\~^*[y]"
@@ -26,7 +26,14 @@ def row(instance, method, errors=None, *, status="ok", seed=0, n=20, **more):
     errors = np.full(n, np.nan) if errors is None else errors
     ok = status == "ok"
     name, title, params = method
-    facts = {"dataset": "1dsfm", "instance": instance, "method": name, "title": title, "params": params}
+    facts = {
+        "dataset": "1dsfm",
+        "instance": instance,
+        "instance_key": instance,
+        "method": name,
+        "title": title,
+        "params": params,
+    }
     facts |= {"seed": seed, "protocol": "truth-subgraph", "alignment": "l1", "status": status}
     facts |= {"solve_s": 0.25 if ok else None, "peak_mib": 101.5 if ok else None, "n_cameras": n}
     facts |= {"n_solved": n if ok else 0, "residual_mean_deg": 3.0, "residual_median_deg": 2.0, "notes": ""}
@@ -185,7 +192,8 @@ class TestLatex:
         assert [text.count(rule) for rule in (r"\toprule", r"\midrule", r"\bottomrule")] == [1, 1, 1]
         body = text[text.index(r"\midrule") : text.index(r"\bottomrule")].splitlines()[1:]
         assert [line.count(" & ") for line in body] == [6, 6]
-        assert r"\begin{tabular}{lrrrccc}" in text
+        assert r"\begin{tabular}{@{}lrrrccc@{}}" in text
+        assert r"\multicolumn{3}{c}{Mean / median error (degrees)}" in text
         assert body[0].count(r"\textbf{") == 2
         assert "a note" in text
 
@@ -208,7 +216,7 @@ class TestLatex:
         assert text.count(r"\begin{table*}") == 3
         assert "part 3 of 3" in text
         for k in range(20):
-            assert text.count(f"}}M{k}\\end") == 1
+            assert len(re.findall(rf"& M{k} (?=&|\\\\)", text)) == 1
             assert text.count(f" {k + 1:.{1 if k > 8 else 2}f} / ") == 1
 
 

@@ -8,7 +8,7 @@ import sys
 
 import typer
 
-from bench.cli import check, data, doctor, list_, merge, new, paper, plot, rerun, run, solve, table
+from bench.cli import bibtex, check, compare, data, doctor, list_, merge, new, paper, plot, rerun, run, solve, table
 
 REFUSED = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
@@ -24,9 +24,11 @@ app.command("rerun")(rerun.rerun)
 app.command("list")(list_.list_)
 app.command("table")(table.table)
 app.command("plot")(plot.plot)
+app.command("compare")(compare.compare)
 app.command("paper")(paper.paper)
 app.command("merge")(merge.merge)
 app.command("doctor")(doctor.doctor)
+app.command("bibtex")(bibtex.bibtex)
 app.add_typer(data.app, name="data")
 app.command("solve")(solve.solve)
 app.command("new")(new.new)

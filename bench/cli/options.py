@@ -59,6 +59,26 @@ PluginOption = Annotated[
 DataDirOption = Annotated[
     Path | None, typer.Option("--data-dir", metavar="DIR", help="Folder where data are looked for first.")
 ]
+StyleOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--style", metavar="FILE", help="TOML file of fonts, colours and names.  [default: bench-style.toml, if there]"
+    ),
+]
+
+
+def wear(given: Path | None = None, width: str | None = None) -> None:
+    """Put a style file in force, saying on standard error which; and a width of figures."""
+    from dataclasses import replace
+
+    from bench.reporting.appearance import find, put_in_force, width_in
+
+    wanted, path = find(given)
+    if path:
+        typer.echo(f"style: {path}", err=True)
+    if width is not None:
+        wanted = replace(wanted, width_in=width_in(width))
+    put_in_force(wanted)
 
 
 def run_folder(given: Path) -> Path:

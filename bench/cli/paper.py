@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import Align, DataDirOption, Format
+from bench.cli.options import Align, DataDirOption, Format, StyleOption, wear
 from bench.cli.progress import execute
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def paper(
     seeds: Annotated[int | None, typer.Option(metavar="N", help="Seeds 0 to N-1 of what is computed.")] = None,
     jobs: Annotated[int | None, typer.Option(metavar="N", help="Jobs at a time.  [default: one a core]")] = None,
     format: Format = Format.CONSOLE,
+    style: StyleOption = None,
 ) -> None:
     """Run what is not done, then print measured | published | difference; a figure is drawn too.
 
@@ -44,6 +45,7 @@ def paper(
     from bench.reporting import paper as tables
     from bench.runner import RUNS_FOLDER, Options
 
+    wear(style)
     layout = load_layout(paper)
     chosen = layout.item(item)
     if isinstance(chosen, PropertyTable):
@@ -54,7 +56,7 @@ def paper(
     options = Options(out=folder, data_dir=data_dir, seeds=seeds, jobs=jobs)
     rule = align.value if align else chosen.alignment
     computed = _computed(chosen, layout.name, options, rule)
-    grid, frame = _compared(chosen, layout, computed, rule)
+    grid, frame = _compared(chosen, layout, computed, rule, format)
     _print(grid, frame, format)
     if isinstance(chosen, CurvePlot):
         from bench.reporting.bands import draw
@@ -62,7 +64,9 @@ def paper(
         _save(draw(chosen, frame, rule, grid.notes), frame, folder / "plots", item)
 
 
-def _compared(item: "Item", layout: "Layout", computed: "Computed", rule: str) -> "tuple[Grid, pd.DataFrame]":
+def _compared(
+    item: "Item", layout: "Layout", computed: "Computed", rule: str, format: Format
+) -> "tuple[Grid, pd.DataFrame]":
     """The table of an item, and the data frame behind it."""
     from bench.papers.claims import Claims
     from bench.papers.curves import CurvePlot
@@ -70,10 +74,12 @@ def _compared(item: "Item", layout: "Layout", computed: "Computed", rule: str) -
     from bench.papers.scenes import SceneTable
     from bench.papers.speedup import Speedup
     from bench.reporting import claims, paper
+    from bench.reporting.side_by_side import side_by_side
 
     if isinstance(item, SceneTable):
         frame = item.compare(read_published(layout.folder, item.published), computed)
-        return paper.scene_grid(item, frame, computed, rule), frame
+        draw = side_by_side if format is Format.LATEX else paper.scene_grid
+        return draw(item, frame, computed, rule), frame
     if isinstance(item, Claims):
         frame = item.compare(read_published(layout.folder, item.published), computed)
         return claims.claims_grid(item, frame, computed, rule), frame

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, ProtocolOption, RunFolder, run_folder
+from bench.cli.options import Align, AlignOption, ProtocolOption, RunFolder, StyleOption, run_folder, wear
 
 
 def plot(
@@ -13,12 +13,23 @@ def plot(
     align: AlignOption = Align.L1,
     protocol: ProtocolOption = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for the plots.  [default: RUN/plots]")] = None,
+    style: StyleOption = None,
+    width: Annotated[
+        str | None,
+        typer.Option(metavar="W", help="Figures for a paper: single (3.5 in), double (7.16 in) or inches."),
+    ] = None,
 ) -> None:
-    """Draw error per scene, cumulative errors and error against time as PNG, PDF and SVG."""
+    """Draw every figure that a run has data for as PNG, PDF and SVG.
+
+    Error per scene, cumulative errors, error against time; with two problems or more rank probabilities, the critical
+    difference and performance profiles too. With --width, title and caption are not drawn but written to
+    captions.tex.
+    """
     from bench.reporting.present import write_plots
     from bench.results import score
     from bench.store import Store
 
+    wear(style, width)
     folder = run_folder(run)
     results = score(Store.open(folder), align.value, protocol.value if protocol else None, checkpoints=True)
     for path in write_plots(results, out or folder / "plots"):

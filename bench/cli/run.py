@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, DataDirOption, Engine, PluginOption, ProtocolOption, Rerun
+from bench.cli.options import Align, AlignOption, DataDirOption, Engine, PluginOption, ProtocolOption, Rerun, wear
 from bench.cli.progress import execute
 
 if TYPE_CHECKING:
@@ -133,6 +133,7 @@ def _present(planned: "Run", align: Align) -> None:
     from bench.reporting.present import render_table, write_plots, write_tables
     from bench.results import score
 
+    wear()
     results = score(planned.store, align.value, planned.options.protocol, checkpoints=True)
     width = shutil.get_terminal_size((100, 24)).columns
     text, _ = render_table(results, "console", width=width, terminal=sys.stdout.isatty())

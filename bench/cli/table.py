@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, Format, ProtocolOption, RunFolder, run_folder
+from bench.cli.options import Align, AlignOption, Format, ProtocolOption, RunFolder, StyleOption, run_folder, wear
 
 
 def table(
@@ -17,12 +17,14 @@ def table(
         bool, typer.Option("--oracle", help="Add the checkpoint that ground truth likes best, labelled so.")
     ] = False,
     format: Format = Format.CONSOLE,
+    style: StyleOption = None,
 ) -> None:
     """Print the table of a run; nothing is run. Notes go to standard error."""
     from bench.reporting.present import render_table
     from bench.results import score
     from bench.store import Store
 
+    wear(style)
     results = score(Store.open(run_folder(run)), align.value, protocol.value if protocol else None, oracle=oracle)
     width = shutil.get_terminal_size((100, 24)).columns
     text, footnotes = render_table(results, format.value, width=width, terminal=sys.stdout.isatty())

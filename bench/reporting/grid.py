@@ -1,17 +1,30 @@
 """The table of a paper: a row for each scene, a column for each method, "mean / median" in the cells.
 
-`Grid` and its two renderers are for any table of that shape.
+`Grid` is any table of that shape.
 """
 
 import math
 import re
-import textwrap
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import pandas as pd
 
-from bench.reporting.rows import ROC_LEGEND, TIE_LEGEND, Configured, Entry, Scene, Ties, area, degrees, scenes
+from bench.reporting import appearance
+from bench.reporting.rows import (
+    ROC_LEGEND,
+    TIE_LEGEND,
+    Configured,
+    Entry,
+    Scene,
+    Ties,
+    area,
+    degrees,
+    exact_seconds,
+    scenes,
+    speedup,
+    times_note,
+)
 
 ABBREVIATIONS = {
     "timeout": "TO",
@@ -27,42 +40,16 @@ UNKNOWN = "n/t"
 PARTIAL = "†"
 ABSENT = "–"
 ROC = "ROC AUC"
-LATEX_COLUMNS = 9  # methods that fit the width of a page
-
-_TEX = {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    '"': "''",
-    "–": "--",
-    "—": "---",
-    "·": r"$\cdot$",
-    "±": r"$\pm$",
-    "°": r"$^\circ$",
-    "†": r"$\dagger$",
-    "½": r"$\frac{1}{2}$",
-    "ℓ": r"$\ell$",
-    "λ": r"$\lambda$",
-    "²": r"$^2$",
-    "…": r"\dots{}",
-    "−": "$-$",
-    "≤": r"$\le$",
-    "≥": r"$\ge$",
-    "→": r"$\to$",
-}
-_TEX |= {c: f"\\{c}" for c in "{}$&%#_"}
-_TEX |= {c: f"{{{c}}}" for c in "[]*"}  # after a line break these would be its options
+TIME, FASTER = "median / min s", "times faster"
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What stands in a place of a table, bold where it stands out."""
+    """What stands in a place of a table, bold or on a coloured ground where it stands out."""
 
     text: str
     bold: bool = False
+    highlight: bool = False
 
 
 @dataclass(frozen=True)
@@ -81,6 +68,8 @@ class Grid:
         Facts and cells of each row; a row whose first fact is empty belongs to the one above it.
     notes
         What stands below.
+    measure
+        What the cells are, as a head over all methods; "" for none.
     """
 
     caption: str
@@ -88,22 +77,13 @@ class Grid:
     methods: tuple[tuple[str, str], ...]
     rows: tuple[tuple[tuple[str, ...], tuple[Cell, ...]], ...]
     notes: tuple[str, ...]
+    measure: str = ""
 
 
-def render_markdown(frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str]) -> str:
-    """Markdown tables, best and ties bold, what the marks mean and the footnotes below."""
-    return markdown(_grids(frame, ties), footnotes)
-
-
-def render_latex(frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str]) -> str:
-    r"""LaTeX ``table*`` environments; the document needs ``\usepackage{booktabs}`` and nothing else."""
-    return latex(_grids(frame, ties), footnotes)
-
-
-def markdown(grids: Sequence[Grid], footnotes: Sequence[str] = ()) -> str:
+def markdown(tables: Sequence[Grid], footnotes: Sequence[str] = ()) -> str:
     """Markdown tables, notes below each and the footnotes at the end."""
     parts = []
-    for grid in grids:
+    for grid in tables:
         header = [*grid.facts, *(f"{title} {params}".strip() for title, params in grid.methods)]
         align = [":--", *("--:" for _ in grid.facts[1:]), *(":-:" for _ in grid.methods)]
         lines = [_pipes(map(markdown_escape, header)), _pipes(align)]
@@ -117,71 +97,16 @@ def markdown(grids: Sequence[Grid], footnotes: Sequence[str] = ()) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def latex(grids: Sequence[Grid], footnotes: Sequence[str] = ()) -> str:
-    """LaTeX tables; the footnotes go below the last."""
-    parts = [part for grid in grids for part in _split(grid)]
-    tables = [_latex_table(part, footnotes if part is parts[-1] else ()) for part in parts]
-    return "% needs \\usepackage{booktabs}\n" + "\n".join(tables)
-
-
-def _split(grid: Grid) -> list[Grid]:
-    """The same table in parts that fit a page's width; the notes go below the last."""
-    count = -(-len(grid.methods) // LATEX_COLUMNS)
-    size = -(-len(grid.methods) // count)
-    return [
-        replace(
-            grid,
-            caption=f"{grid.caption} (part {part + 1} of {count})" if count > 1 else grid.caption,
-            methods=grid.methods[part * size : (part + 1) * size],
-            rows=tuple((facts, cells[part * size : (part + 1) * size]) for facts, cells in grid.rows),
-            notes=grid.notes if part == count - 1 else (),
-        )
-        for part in range(count)
-    ]
-
-
-def _latex_table(grid: Grid, footnotes: Sequence[str]) -> str:
-    header = [*map(latex_escape, grid.facts), *(_latex_header(*method) for method in grid.methods)]
-    lines = [
-        r"\begin{table*}[htbp]",
-        r"\centering",
-        rf"\caption{{{latex_escape(grid.caption)}}}",
-        r"\scriptsize" if len(grid.methods) > 6 else r"\footnotesize",
-        r"\setlength{\tabcolsep}{3pt}",
-        rf"\begin{{tabular}}{{l{'r' * (len(grid.facts) - 1)}{'c' * len(grid.methods)}}}",
-        r"\toprule",
-        rf"{' & '.join(header)} \\",
-        r"\midrule",
-    ]
-    grouped = False
-    for facts, cells in grid.rows:
-        shown = (rf"\textbf{{{latex_escape(c.text)}}}" if c.bold else latex_escape(c.text) for c in cells)
-        if grouped and facts[0]:
-            lines.append(r"\addlinespace")
-        grouped = not facts[0]
-        lines.append(rf"{' & '.join([*map(latex_escape, facts), *shown])} \\")
-    lines += [r"\bottomrule", r"\end{tabular}", ""]
-    lines += [rf"\par\smallskip\raggedright {latex_escape(note)}" for note in (*grid.notes, *footnotes)]
-    return "\n".join([*lines, r"\end{table*}", ""])
-
-
-def _latex_header(title: str, params: str) -> str:
-    """A narrow column head: a word or two a line."""
-    lines = textwrap.wrap(title, 10, break_long_words=False)
-    for parameter in filter(None, params.split(",")):
-        lines += [parameter] if len(parameter) <= 10 else parameter.replace("=", "=\n").split("\n")
-    stacked = r" \\ ".join(map(latex_escape, lines))
-    return rf"\begin{{tabular}}[b]{{@{{}}c@{{}}}}{stacked}\end{{tabular}}"
-
-
-def _grids(frame: pd.DataFrame, ties: Ties) -> list[Grid]:
+def grids(frame: pd.DataFrame, ties: Ties) -> list[Grid]:
+    """A table for each dataset, protocol and alignment."""
     groups: dict[tuple[str, str, str], list[Scene]] = {}
     for scene in scenes(frame, ties):
         groups.setdefault((scene.dataset, scene.protocol, scene.alignment), []).append(scene)
-    return [_grid(group) for group in groups.values()]
+    timing = f"{times_note(frame)[0].upper()}{times_note(frame)[1:]}." if "speedup" in frame else ""
+    return [_grid(group, timing) for group in groups.values()]
 
 
-def _grid(group: Sequence[Scene]) -> Grid:
+def _grid(group: Sequence[Scene], timing: str) -> Grid:
     first = group[0]
     methods = _methods(group)
     columns: list[tuple[str, Callable[[Scene], str]]] = [
@@ -196,27 +121,30 @@ def _grid(group: Sequence[Scene]) -> Grid:
         by_method = {(e.method, e.params): e for e in scene.entries}
         cells = tuple(_cell(scene, by_method.get(method)) for method in methods)
         rows.append((tuple(fact(scene) for _, fact in shown), cells))
-        if scene.has_roc:
-            areas = (by_method[m].roc_auc.mean if m in by_method else math.nan for m in methods)
-            rows.append((("", *[""] * (len(shown) - 2), ROC), tuple(Cell(area(value)) for value in areas)))
+        entries = [by_method.get(method) for method in methods]
+        further = [(TIME, _time), (FASTER, speedup)] if timing else []
+        further += [(ROC, _area)] if scene.has_roc else []
+        for label, of in further:
+            below = ("", *[""] * (len(shown) - 2), label)
+            rows.append((below, tuple(Cell(of(entry) if entry else ABSENT) for entry in entries)))
+    notes = _notes(group, [cell.text for _, cells in rows for cell in cells])
     return Grid(
         caption=f"{first.dataset}: mean / median error in degrees, {first.alignment} alignment, "
         f"protocol {first.protocol}",
         facts=tuple(name for name, _ in shown),
         methods=tuple(methods.values()),
         rows=tuple(rows),
-        notes=tuple(_notes(group, [cell.text for _, cells in rows for cell in cells])),
+        notes=(*notes, timing) if timing else tuple(notes),
+        measure="Mean / median error (degrees)",
     )
 
 
 def _methods(group: Sequence[Scene]) -> dict[Configured, tuple[str, str]]:
     """Title and parameters of every configured method; the id is added where two share both."""
-    entries = {(e.method, e.params): e for scene in group for e in scene.entries}
-    heads = [(e.title, e.params) for e in entries.values()]
-    return {
-        key: (e.title if heads.count((e.title, e.params)) == 1 else f"{e.title} ({e.method})", e.params)
-        for key, e in entries.items()
-    }
+    titles = {(e.method, e.params): e.title for scene in group for e in scene.entries}
+    heads = {key: appearance.current().head(*key, title) for key, title in titles.items()}
+    shown = list(heads.values())
+    return {key: head if shown.count(head) == 1 else (f"{head[0]} ({key[0]})", head[1]) for key, head in heads.items()}
 
 
 def _cell(scene: Scene, entry: Entry | None) -> Cell:
@@ -230,6 +158,14 @@ def _cell(scene: Scene, entry: Entry | None) -> Cell:
     most = max(e.scored for e in scene.entries)
     marks = PARTIAL * (entry.scored < most) + f" ({entry.ok}/{entry.seeds})" * (entry.ok < entry.seeds)
     return Cell(f"{mean} / {median}{marks}", entry.best)
+
+
+def _time(entry: Entry) -> str:
+    return " / ".join(exact_seconds(entry.values[name].mean) for name in ("solve_s", "min_s"))
+
+
+def _area(entry: Entry) -> str:
+    return area(entry.roc_auc.mean)
 
 
 def _short(value: float) -> str:
@@ -248,11 +184,12 @@ def _notes(group: Sequence[Scene], cells: Sequence[str]) -> list[str]:
     notes = [f"Bold: {TIE_LEGEND}."] if any(e.best for scene in group for e in scene.entries) else []
     legend = {
         PARTIAL: "fewer cameras scored than by another method",
-        "(": "(k/s) only k of s seeds ended well",
         UNKNOWN: "solved, but no camera has ground truth",
         ABSENT: "not in this run, or no edge weights" if any(s.has_roc for s in group) else "not in this run",
     }
-    marks = [meaning if mark == "(" else f"{mark}: {meaning}" for mark, meaning in legend.items() if mark in text]
+    counted = re.search(r"\(\d+/\d+\)", text) is not None
+    marks = [f"{mark}: {meaning}" for mark, meaning in legend.items() if mark in text]
+    marks += ["(k/s): only k of s seeds ended well"] if counted else []
     if any(scene.has_roc for scene in group):
         marks.append(f"{ROC}: {ROC_LEGEND}")
     used = set(re.split(r"[ /]", text))
@@ -290,9 +227,3 @@ def markdown_escape(text: str) -> str:
     flat = " ".join(str(text).split())
     flat = flat.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     return re.sub(r"([\\`*_\[\]|~#$])", r"\\\1", flat)
-
-
-def latex_escape(text: str) -> str:
-    """Text that LaTeX prints as it is."""
-    escaped = "".join(_TEX.get(c, c) for c in " ".join(str(text).split()))
-    return escaped.replace("--", "-{}-") if "--" in str(text) else escaped

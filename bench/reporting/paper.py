@@ -12,7 +12,8 @@ from bench.papers.properties import PropertyTable
 from bench.papers.published import FACTS
 from bench.papers.scenes import NO_TRUTH, NOT_ON_DISK, PUBLISHED_ONLY, SceneTable
 from bench.reporting.console import render_grid
-from bench.reporting.grid import ABBREVIATIONS, ABSENT, UNKNOWN, Cell, Grid, abbreviated, gathered, latex, markdown
+from bench.reporting.grid import ABBREVIATIONS, ABSENT, UNKNOWN, Cell, Grid, abbreviated, gathered, markdown
+from bench.reporting.latex import latex
 from bench.reporting.rows import OK, degrees
 
 HEADS = {"n_cameras": "Cameras", "edges_percent": "Edges %", "hardness": "Hardness"}
@@ -44,7 +45,7 @@ def scene_grid(table: SceneTable, frame: pd.DataFrame, computed: Computed, align
     alignment
         The rule that removed the gauge.
     """
-    marks = _marks(frame, computed)
+    marks = marks_of(frame, computed)
     columns = frame.loc[~frame["quantity"].isin(FACTS), ["quantity", "method"]].drop_duplicates()
     keys = list(columns.itertuples(index=False, name=None))
     rows = []
@@ -58,7 +59,7 @@ def scene_grid(table: SceneTable, frame: pd.DataFrame, computed: Computed, align
             continue
         here = tuple(_fixed(row.measured, _DIGITS[row.quantity]) for row in facts)
         off = tuple(_signed(row.difference, _DIGITS[row.quantity]) for row in facts)
-        rows.append(((label, "measured", *here), tuple(Cell(_measured(r), r.near_measured) for r in errors)))
+        rows.append(((label, "measured", *here), tuple(Cell(error_text(r), r.near_measured) for r in errors)))
         rows.append((("", "published", *published[0]), tuple(published[1])))
         rows.append((("", "difference", *off), tuple(Cell(_signed(r.difference, _ERROR_DIGITS)) for r in errors)))
     return Grid(
@@ -66,24 +67,29 @@ def scene_grid(table: SceneTable, frame: pd.DataFrame, computed: Computed, align
         facts=("Scene", "", *(HEADS[fact] for fact in FACTS)),
         methods=tuple((column, _parameters(method)) for column, method in keys),
         rows=tuple(rows),
-        notes=tuple(_scene_notes(table, frame, computed, marks)),
+        notes=tuple(scene_notes(table, frame, computed, marks)),
     )
 
 
-def _marks(frame: pd.DataFrame, computed: Computed) -> dict[str, tuple[str, str]]:
+def marks_of(frame: pd.DataFrame, computed: Computed) -> dict[str, tuple[str, str]]:
     """A letter and what it says for each instance whose data or truth are not the paper's."""
     noted = {name: "; ".join(notes) for name, notes in (computed.notes or {}).items() if notes}
     ordered = [name for name in dict.fromkeys(frame["instance"]) if name in noted]
     return {name: (letter, noted[name]) for name, letter in zip(ordered, _MARKS, strict=False)}
 
 
-def _scene_notes(
-    table: SceneTable, frame: pd.DataFrame, computed: Computed, marks: Mapping[str, tuple[str, str]]
+def scene_notes(
+    table: SceneTable,
+    frame: pd.DataFrame,
+    computed: Computed,
+    marks: Mapping[str, tuple[str, str]],
+    highlighted: str = "Bold, or *",
 ) -> Iterator[str]:
+    """What stands out, the letters at scenes, abbreviations, failures and notes, and what is missing."""
     first = next(iter(table.measured[table.highlight_reference]), "")
     among = f"; measured: from {first}" if first else ""
     yield (
-        f"Bold, or *: at most {table.highlight_deg:g} degrees from {table.highlight_reference} in the same row, the "
+        f"{highlighted}: at most {table.highlight_deg:g} degrees from {table.highlight_reference} in the same row, the "
         f"paper's rule{among}."
     )
     for letter, note in marks.values():
@@ -104,7 +110,8 @@ def _scene_notes(
     yield from (f"{sentence[0].upper()}{sentence[1:]}." for sentence in computed.missing)
 
 
-def _measured(row: "object") -> str:
+def error_text(row: "object") -> str:
+    """A measured error, or why there is none."""
     measured, status = float(row.measured), str(row.status)  # type: ignore[attr-defined]
     if math.isfinite(measured):
         return f"{measured:.{_ERROR_DIGITS}f}"

@@ -15,8 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from bench.problem import Floats
+from bench.reporting.ranking import ranking_figures
 from bench.reporting.rows import OK, Configured, Place, times_note
-from bench.reporting.style import GREY, Look, describe, log_axis, looks, panels, save, styled
+from bench.reporting.style import GREY, Look, columns_of, describe, lines_of, log_axis, looks, panels, save, styled
 
 __all__ = ["cumulative_errors", "error_against_time", "error_per_scene", "figures", "save"]
 
@@ -40,7 +41,7 @@ def figures(frame: pd.DataFrame, errors: Errors) -> dict[str, Figure]:
     }
     if len(_scored(frame, errors)) > 1:
         drawn["error-against-time-all-scenes"] = error_against_time(frame, aggregated=True)
-    return drawn
+    return drawn | ranking_figures(frame)
 
 
 def error_per_scene(frame: pd.DataFrame, errors: Errors) -> Figure:
@@ -48,7 +49,7 @@ def error_per_scene(frame: pd.DataFrame, errors: Errors) -> Figure:
     places = _scored(frame, errors)
     look = looks(frame)
     with styled():
-        figure, axes = panels(len(places), 2.3, 0.19 * len(look) + 0.55, ())
+        figure, axes = panels(len(places), 2.3, 0.19 * lines_of(look) * len(look) + 0.55, ())
         floored = False
         low = math.inf
         for ax, place in zip(axes, places, strict=True):
@@ -281,11 +282,10 @@ def _not_drawn(frame: pd.DataFrame, drawn: Sequence[Place]) -> str:
 
 def _label_bottom(axes: Sequence[Axes], text: str) -> None:
     """Label the x axis of the lowest panel of each column."""
-    columns = min(3, len(axes))
-    for ax in axes[-columns:]:
+    for ax in axes[-columns_of(len(axes)) :]:
         ax.set_xlabel(text)
 
 
 def _label_left(axes: Sequence[Axes], text: str) -> None:
-    for ax in axes[:: min(3, len(axes))]:
+    for ax in axes[:: columns_of(len(axes))]:
         ax.set_ylabel(text)

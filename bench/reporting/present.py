@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from bench.reporting import tables
+from bench.reporting import appearance, tables
+from bench.reporting.intervals import with_intervals
 from bench.results import Results
 
 EXTENSIONS = {"console": "txt", "markdown": "md", "csv": "csv", "latex": "tex"}
@@ -12,7 +13,10 @@ def render_table(
     results: Results, style: str, *, width: int = 100, terminal: bool = False
 ) -> tuple[str, tuple[str, ...]]:
     """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render`."""
-    return tables.render(results.frame, results.ties, results.footnotes, style, width=width, terminal=terminal)
+    frame = appearance.current().ordered(results.frame)
+    if style == "csv":
+        frame = with_intervals(frame, results.errors)
+    return tables.render(frame, results.ties, results.footnotes, style, width=width, terminal=terminal)
 
 
 def write_tables(results: Results, folder: Path) -> list[Path]:
@@ -27,11 +31,16 @@ def write_tables(results: Results, folder: Path) -> list[Path]:
 
 
 def write_plots(results: Results, folder: Path) -> list[Path]:
-    """Draw every figure that the run has data for, as PNG, PDF and SVG."""
-    from bench.reporting import iterations, plots
+    """Draw every figure that the run has data for, as PNG, PDF and SVG; those for a paper with a file of captions."""
+    from bench.reporting import captions, iterations, plots
 
     folder.mkdir(parents=True, exist_ok=True)
-    figures = plots.figures(results.frame, results.errors)
+    frame = appearance.current().ordered(results.frame)
+    figures = plots.figures(frame, results.errors)
     if results.curves:
-        figures["error-over-iterations"] = iterations.error_over_iterations(results.frame, results.curves)
-    return [path for name, figure in figures.items() for path in plots.save(figure, folder, name)]
+        figures["error-over-iterations"] = iterations.error_over_iterations(frame, results.curves)
+    written = [path for name, figure in figures.items() for path in plots.save(figure, folder, name)]
+    if appearance.current().width_in and figures:
+        written.append(folder / "captions.tex")
+        written[-1].write_text(captions.captions(figures), encoding="utf-8")
+    return written

@@ -74,8 +74,8 @@ def render(
 
         return render_console(frame, ties, footnotes, width=width, terminal=terminal), ()
     if style in ("markdown", "latex"):
-        from bench.reporting import grid
+        from bench.reporting.grid import grids, markdown
+        from bench.reporting.latex import latex
 
-        draw = grid.render_markdown if style == "markdown" else grid.render_latex
-        return draw(frame, ties, footnotes), ()
+        return (markdown if style == "markdown" else latex)(grids(frame, ties), footnotes), ()
     raise InputError(f"there is no table format '{style}'{suggestion(style, FORMATS)}")

@@ -35,7 +35,7 @@ def paired(left: Floats, right: Floats, margin: float = 0.0) -> Difference:
     d = np.asarray(left, dtype=float) - np.asarray(right, dtype=float)
     if len(d) < 2:
         return Difference(float(d.mean()) if len(d) else np.nan, np.nan, np.nan, np.nan, np.nan)
-    return _judged(float(d.mean()), float(d.std(ddof=1) / np.sqrt(len(d))), len(d) - 1, margin)
+    return judged(float(d.mean()), float(d.std(ddof=1) / np.sqrt(len(d))), len(d) - 1, margin)
 
 
 def unpaired(left: Floats, right: Floats, margin: float = 0.0) -> Difference:
@@ -48,10 +48,11 @@ def unpaired(left: Floats, right: Floats, margin: float = 0.0) -> Difference:
     total = float(sum(variances))
     parts = variances[0] ** 2 / (len(a) - 1) + variances[1] ** 2 / (len(b) - 1)
     freedom = total**2 / float(parts) if parts > 0 else float(len(a) + len(b) - 2)
-    return _judged(mean, float(np.sqrt(total)), freedom, margin)
+    return judged(mean, float(np.sqrt(total)), freedom, margin)
 
 
-def _judged(mean: float, error: float, freedom: float, margin: float) -> Difference:
+def judged(mean: float, error: float, freedom: float, margin: float = 0.0) -> Difference:
+    """Student's t for a mean difference with its standard error and degrees of freedom."""
     from scipy.special import stdtr, stdtrit
 
     if error < SMALLEST:

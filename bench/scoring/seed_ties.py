@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.problem import Floats
-from bench.scoring.statistics import FLOOR_DEG, MIN_COVERAGE, RESOLUTION, SMALLEST
+from bench.scoring.resampling import FLOOR_DEG, SMALLEST
+from bench.scoring.statistics import MIN_COVERAGE, RESOLUTION
 
 Key = TypeVar("Key", bound=Hashable)
 

@@ -1,0 +1,47 @@
+"""``bench bibtex``: what a paper that uses a run has to cite."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from bench.cli.options import RunFolder, run_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from bench.registry import Info
+    from bench.plan import Job
+
+
+def bibtex(run: RunFolder) -> None:
+    """Print the BibTeX entries of every method and dataset of a run, and of the benchmark's own paper.
+
+    What has none is said on standard error.
+    """
+    from bench.bibliography import bibliography, cite_keys
+    from bench.store import Store
+
+    used = list(_used(Store.open(run_folder(run)).jobs()))
+    typer.echo("\n\n".join(bibliography(used).values()))
+    for info in used:
+        if not cite_keys(info):
+            typer.echo(f"{info.kind} {info.name} declares no reference", err=True)
+
+
+def _used(jobs: "list[Job]") -> "Iterator[Info]":
+    """Methods and datasets of the jobs, in their order; what is no longer there is said on standard error."""
+    from bench import registry, selection
+
+    plugins = [path for path in dict.fromkeys(job.origin for job in jobs) if Path(path).is_file()]
+    names = {
+        "dataset": dict.fromkeys(selection.parse(job.dataset).name for job in jobs),
+        "method": dict.fromkeys(job.method for job in jobs),
+    }
+    for kind, wanted in names.items():
+        known = registry.catalog(kind, plugins).entries
+        for name in wanted:
+            if name in known:
+                yield known[name]
+            else:
+                typer.echo(f"{kind} {name} is not installed here: its reference is missing", err=True)

@@ -1,0 +1,143 @@
+"""Comparisons over several problems: blocks, ranks, critical differences, profiles; by hand or against scipy."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from bench.scoring.blocks import Blocks, blocks
+from bench.scoring.profiles import performance_profiles, profile_frame
+from bench.scoring.ranking import critical_difference, friedman_p, rank_frame, rank_probabilities, ranks
+
+RNG = np.random.default_rng(0)
+
+
+def table(values: object, scenes: tuple[int, ...] | None = None) -> Blocks:
+    array = np.asarray(values, dtype=float)
+    methods = tuple((name, "") for name in "abcdefgh"[: array.shape[1]])
+    return Blocks(methods, array, scenes or tuple(range(len(array))))
+
+
+def row(instance: str, method: str, median: float, **more: object) -> dict[str, object]:
+    facts = {"dataset": "d", "instance": instance, "instance_key": instance, "protocol": "all", "seed": 0}
+    facts |= {"method": method, "params": "", "status": "ok", "n_scored": 100, "median_deg": median}
+    return facts | more
+
+
+class TestBlocks:
+    def test_seeds_of_one_instance_are_one_block_and_other_instances_one_each(self) -> None:
+        rows = [row("real", "a", median, seed=s) for s, median in enumerate((1.0, 4.0))]
+        rows += [row("real", "b", 3.0)]
+        rows += [row("drawn", m, 2.0, seed=s, instance_key=f"drawn{s}") for m in "ab" for s in range(3)]
+        found = blocks(pd.DataFrame(rows))
+        assert found.methods == (("a", ""), ("b", ""))
+        assert np.allclose(found.values, [[2, 3], [2, 2], [2, 2], [2, 2]])
+        assert found.scenes == (0, 1, 1, 1)
+
+    def test_a_scene_under_two_protocols_is_one_block(self) -> None:
+        rows = [row("s", m, 2.0, protocol=p, instance_key=p) for m in "ab" for p in ("component", "truth-subgraph")]
+        assert blocks(pd.DataFrame(rows)).values.shape == (1, 2)
+
+    def test_failing_and_leaving_out_cameras_is_worse_than_any_error(self) -> None:
+        rows = [
+            row("s", "a", 9.0),
+            row("s", "b", np.nan, status="timeout", n_scored=0),
+            row("s", "c", 0.1, n_scored=90),
+        ]
+        rows += [row("t", m, np.nan, n_scored=0) for m in "abc"]
+        found = blocks(pd.DataFrame(rows))
+        assert found.values.tolist() == [[9.0, np.inf, np.inf]] or np.allclose(found.values[0, 0], 9.0)
+        assert np.isinf(found.values[0, 1:]).all()
+        assert not found.enough
+
+    def test_a_method_that_was_not_run_everywhere_is_left_out(self) -> None:
+        found = blocks(pd.DataFrame([row("s", "a", 1.0), row("s", "b", 1.0), row("t", "a", 2.0)]))
+        assert (found.methods, found.left_out) == ((("a", ""),), (("b", ""),))
+
+    def test_nothing_scored(self) -> None:
+        assert not blocks(pd.DataFrame([row("s", "a", np.nan, n_scored=0)])).enough
+
+
+class TestRanks:
+    def test_ties_share_the_mean_and_failures_come_last(self) -> None:
+        assert ranks(np.array([[2.0, 1.0, 2.0, np.inf]])).tolist() == [[2.5, 1.0, 2.5, 4.0]]
+
+    def test_probabilities_are_certain_where_one_always_wins_and_shared_where_two_tie(self) -> None:
+        found = rank_probabilities(table([[1, 2, 2], [5, 7, 7]]))
+        assert found.tolist() == [[1, 0, 0], [0, 0.5, 0.5], [0, 0.5, 0.5]]
+
+    def test_probabilities_are_those_of_the_bootstrap(self) -> None:
+        """One of three scenes goes to b: b leads a resample with two or three draws of it, 7 of 27."""
+        found = rank_probabilities(table([[1, 2], [1, 2], [2, 1]]))
+        assert found[1, 0] == pytest.approx(7 / 27, abs=0.03)
+        assert np.allclose(found.sum(axis=0), 1)
+        assert np.allclose(found.sum(axis=1), 1)
+
+    def test_many_seeds_of_one_scene_do_not_outvote_the_others(self) -> None:
+        values = [[2, 1]] * 9 + [[1, 2]] * 2
+        found = rank_frame(table(values, (0,) * 9 + (1, 2)))
+        assert found["method"].tolist() == ["a", "b"]
+        assert found["mean_rank"].tolist() == pytest.approx([4 / 3, 5 / 3])
+        assert found["p_rank_1"].tolist() == pytest.approx([20 / 27, 7 / 27], abs=0.03)
+
+
+class TestCriticalDifference:
+    def test_friedman_is_scipys_in_the_form_of_iman_and_davenport(self) -> None:
+        values = RNG.random((12, 4)).round(1)
+        chi = stats.friedmanchisquare(*values.T).statistic
+        f = 11 * chi / (12 * 3 - chi)
+        assert friedman_p(ranks(values)) == pytest.approx(stats.f.sf(f, 3, 33))
+        assert friedman_p(ranks(np.tile([1.0, 2.0, 3.0], (5, 1)))) == 0
+        assert friedman_p(ranks(np.ones((5, 3)))) == 1
+
+    def test_nemenyis_difference_is_demsars(self) -> None:
+        """q of Table 5(a) in Demsar 2006: 2.569 for four methods, 3.164 for ten; there CD = 1.25 for 14 data sets."""
+        found = critical_difference(table(RNG.random((14, 4))))
+        assert found.critical_difference == pytest.approx(2.569 * np.sqrt(4 * 5 / (6 * 14)), abs=1e-3)
+        ten = critical_difference(
+            Blocks(tuple((str(k), "") for k in range(10)), RNG.random((20, 10)), tuple(range(20)))
+        )
+        assert ten.critical_difference == pytest.approx(3.164 * np.sqrt(110 / 120), abs=1e-2)
+
+    @pytest.mark.parametrize("post_hoc", ["nemenyi", "wilcoxon"])
+    def test_groups_join_what_is_not_told_apart(self, post_hoc: str) -> None:
+        base = RNG.random((20, 1)) + 1
+        values = base * np.array([5.0, 1.0, 1.0, 5.0]) * np.exp(0.1 * RNG.standard_normal((20, 4)))
+        found = critical_difference(table(values), post_hoc)  # type: ignore[arg-type]
+        assert found.friedman_p < 1e-6
+        assert found.groups == ((0, 1), (2, 3))
+        assert {found.methods[0][0], found.methods[1][0]} == {"b", "c"}
+        if post_hoc == "nemenyi":
+            apart = np.abs(np.subtract.outer(found.mean_ranks, found.mean_ranks)) > found.critical_difference
+            assert np.array_equal(found.p_values < 0.05, apart)
+
+    def test_without_friedman_all_are_one_group(self) -> None:
+        found = critical_difference(table([[1, 2, 3], [3, 2, 1], [2, 1, 3]]))
+        assert found.groups == ((0, 2),)
+
+    def test_failures_on_both_sides_are_no_difference(self) -> None:
+        values = np.where(RNG.random((9, 3)) < 0.5, np.inf, 1.0)
+        values[:, 1] = values[:, 0]
+        found = critical_difference(table(values), "wilcoxon")
+        first, second = (found.methods.index((name, "")) for name in "ab")
+        assert found.p_values[first, second] == 1
+
+
+class TestProfiles:
+    def test_shares_are_those_worked_out_by_hand(self) -> None:
+        a, b = performance_profiles(table([[1, 2], [3, 3], [4, 1], [1, np.inf]]))
+        assert (a.ratios.tolist(), a.shares.tolist()) == ([1, 4], [0.75, 1])
+        assert (b.ratios.tolist(), b.shares.tolist()) == ([1, 2], [0.5, 0.75])
+
+    def test_one_that_never_wins_starts_at_zero(self) -> None:
+        _, b = performance_profiles(table([[1, 2], [1, 3]]))
+        assert (b.ratios.tolist(), b.shares.tolist()) == ([1, 2, 3], [0, 0.5, 1])
+
+    def test_as_plain_data(self) -> None:
+        found = profile_frame(performance_profiles(table([[1, 2]])))
+        assert found.to_dict("list") == {
+            "method": ["a", "b", "b"],
+            "params": ["", "", ""],
+            "ratio": [1.0, 1.0, 2.0],
+            "share": [1.0, 0.0, 1.0],
+        }
