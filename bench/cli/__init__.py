@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from bench.cli import check, data, list_, new, paper, plot, run, solve, table
+from bench.cli import check, data, list_, map, new, paper, plot, run, solve, table
 
 app = typer.Typer(
     name="bench",
@@ -21,6 +21,7 @@ app.command("list")(list_.list_)
 app.command("table")(table.table)
 app.command("plot")(plot.plot)
 app.command("paper")(paper.paper)
+app.command("map", epilog=map.EPILOG)(map.map_)
 app.add_typer(data.app, name="data")
 app.command("solve")(solve.solve)
 app.command("new")(new.new)
