@@ -76,7 +76,8 @@ def next_samples(tally: Tally) -> list[Sample]:
     if unseen:
         return unseen
     beside = beside_boundary(tally.expected())
-    return _samples(tally, beside & (tally.tried == 0)) or _samples(tally, beside & ~tally.decided)
+    unsure = beside | ((tally.hits > 0) & (tally.hits < tally.tried))
+    return _samples(tally, beside & (tally.tried == 0)) or _samples(tally, unsure & ~tally.decided)
 
 
 def every_sample(tally: Tally) -> list[Sample]:
