@@ -29,9 +29,8 @@ class Past:
         self.pace = Pace()
         self._sizes: dict[str, float] = {}
         wanted = {cell.job.method for cell in planned.cells}
-        todo = {cell.job.id for cell in planned.todo}
         for store in self.stores:
-            self._read(store, [job for job in _jobs(store) if job.method in wanted and job.id not in todo])
+            self._read(store, [job for job in _jobs(store) if job.method in wanted])
 
     def task(self, job: Job) -> Task:
         """A job as far as its time is concerned."""

@@ -77,7 +77,9 @@ def _live(planned: "Run", console: "Console") -> None:
     failures: list[str] = []
     outcomes: Counter[str] = Counter()
     printed = time.monotonic()
-    with Live(board, console=console, refresh_per_second=REFRESHES, transient=True):
+    live = Live(board, console=console, refresh_per_second=REFRESHES, transient=True)
+    try:  # not `with`: Ctrl-C during the first drawing must give the cursor back too
+        live.start(refresh=True)
         for count, (cell, record) in enumerate(planned.execute(), start=1):
             board.end(cell.job, record)
             outcomes[record["outcome"]] += 1
@@ -87,7 +89,11 @@ def _live(planned: "Run", console: "Console") -> None:
                 _print(console, failures)
                 printed = time.monotonic()
         _print(console, failures)
-    ended = ", ".join(f"{count} {name}" for name, count in outcomes.most_common())
+    finally:
+        live.stop()
+    ended = ", ".join(
+        f"{count} {name}" for name, count in sorted(outcomes.items(), key=lambda kind: kind[0] != outcome.OK)
+    )
     console.print(f"{len(jobs)} jobs in {span(board.elapsed_s)}: {ended}", markup=False)
 
 

@@ -21,6 +21,7 @@ BUSY = 50  # the ETA is computed anew when that many times what it took has gone
 OTHER_LINES = 4  # head of the table, its rule, the line below and one to spare
 FEWEST_ROWS = 3
 RUNNING = "running now"
+WIDE = 70  # columns that it takes to say what is running
 
 
 @dataclass
@@ -112,7 +113,7 @@ class Board:
         """Draw the table, no higher than the terminal, and the line below it."""
         height = options.height or console.size.height
         with self._lock:
-            yield Group(self._table(max(height - OTHER_LINES, FEWEST_ROWS)), self._footer(options.max_width))
+            yield Group(self._table(max(height - OTHER_LINES, FEWEST_ROWS), options.max_width), self._footer())
 
     def _leave(self, job: str) -> None:
         """A job waits no longer."""
@@ -148,23 +149,25 @@ class Board:
             if (expected := self.pace.expect(known)) is not None:
                 yield known, max(expected - elapsed, 0.0)
 
-    def _table(self, rows: int) -> Table:
+    def _table(self, rows: int, width: int) -> Table:
+        with_running = self._in_order and width >= WIDE
         table = Table(box=None, padding=(0, 1, 0, 0), expand=True, header_style="bold")
         table.add_column("method", ratio=3, no_wrap=True, overflow="ellipsis")
         for head in ("done", "failed", "mean s", "left"):
             table.add_column(head, justify="right", no_wrap=True)
-        if self._in_order:
+        if with_running:
             table.add_column(RUNNING, ratio=3, no_wrap=True, overflow="ellipsis")
         running = self._running_of()
         self._foresee()
         left = self._left
         shown, folded = self._chosen(rows, running)
         for name in shown:
-            self._add(table, name, [self._rows[name]], left.get(name), running.get(name, ""))
+            extra = (Text(running.get(name, "")),) if with_running else ()
+            table.add_row(*self._cells(name, [self._rows[name]], left.get(name)), *extra)
         if folded:
             known = [left[name] for name in folded if name in left]
             together = sum(known) if known else None
-            self._add(table, f"… {len(folded)} more", [self._rows[name] for name in folded], together, "")
+            table.add_row(*self._cells(f"… {len(folded)} more", [self._rows[name] for name in folded], together))
         return table
 
     def _chosen(self, rows: int, running: Mapping[str, str]) -> tuple[list[str], list[str]]:
@@ -180,17 +183,16 @@ class Board:
         kept = set(sorted(names, key=rank)[: rows - 1])
         return [name for name in names if name in kept], [name for name in names if name not in kept]
 
-    def _add(self, table: Table, name: str, rows: Sequence[_Row], left: float | None, running: str) -> None:
+    def _cells(self, name: str, rows: Sequence[_Row], left: float | None) -> list[str | Text]:
         done, total, failed = (sum(getattr(row, key) for row in rows) for key in ("done", "total", "failed"))
         solved, seconds = (sum(row.solve_s[k] for row in rows) for k in (0, 1))
-        cells: list[str | Text] = [
+        return [
             Text(name, style="dim" if done == total else ""),
             f"{done}/{total}",
             Text(str(failed) if failed else "", style="red"),
             f"{seconds / solved:.3g}" if solved else "",
             span(left) if left is not None and done < total else "",
         ]
-        table.add_row(*cells, *([Text(running)] if self._in_order else []))
 
     def _running_of(self) -> dict[str, str]:
         """What runs of each configured method: the instance and for how long, the longest first."""
@@ -201,7 +203,7 @@ class Board:
             found.setdefault(self._tasks[job].configured, []).append(text)
         return {name: texts[0] + (f" +{len(texts) - 1}" if len(texts) > 1 else "") for name, texts in found.items()}
 
-    def _footer(self, width: int) -> Table:
+    def _footer(self) -> Table:
         done = sum(row.done for row in self._rows.values())
         left = self.eta_s()
         ends = f"ETA {span(left)}" if left is not None else "ETA unknown"
