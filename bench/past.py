@@ -1,5 +1,6 @@
 """What earlier runs tell about how long the jobs of a run will take."""
 
+import contextlib
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from bench.store import Job, Store
 
 OTHER_RUNS = 3  # that are looked at, newest first
 MOST_RECORDS = 300  # read of each run
+FEWEST_RECORDS = 5  # of each configured method, where there are that many
 MOST_PLANNED = 20_000_000  # bytes of plans, beyond which reading another run costs more than it tells
 
 
@@ -30,7 +32,12 @@ class Past:
         self._sizes: dict[str, float] = {}
         wanted = {cell.job.method for cell in planned.cells}
         for store in self.stores:
-            self._read(store, [job for job in _jobs(store) if job.method in wanted])
+            by_method: dict[str, list[Job]] = {}
+            for job in _jobs(store):
+                if job.method in wanted and (job.rounds > 0) == planned.options.timing:
+                    by_method.setdefault(self.task(job).configured, []).append(job)
+            for jobs in by_method.values():
+                self._read(store, jobs, MOST_RECORDS // len(by_method))
 
     def task(self, job: Job) -> Task:
         """A job as far as its time is concerned."""
@@ -39,11 +46,10 @@ class Past:
             self._sizes[key] = self._size(key)
         return Task(job.method, format_selection(job.method, dict(job.parameters)), self._sizes[key])
 
-    def _read(self, store: Store, jobs: Sequence[Job]) -> None:
-        for job in jobs[:: max(1, len(jobs) // MOST_RECORDS)]:
-            record = store.record(job.id)
-            if record is not None:
-                self.pace.see(self.task(job), record, job.rounds)
+    def _read(self, store: Store, jobs: Sequence[Job], most: int) -> None:
+        for job in jobs[:: -(-len(jobs) // max(most, FEWEST_RECORDS))]:
+            with contextlib.suppress(InputError):  # a record that cannot be read tells nothing
+                self.pace.see(self.task(job), store.record(job.id) or {}, job.rounds)
 
     def _size(self, key: str) -> float:
         """Bytes of the stored problem, which go with its edges; NaN where no run has stored it."""
@@ -64,7 +70,8 @@ def _beside(folder: Path) -> Iterator[Store]:
         return
     for path in others[:OTHER_RUNS]:
         if sum(file.stat().st_size for file in (path / "plans").rglob("*") if file.is_file()) <= MOST_PLANNED:
-            yield Store(path)
+            with contextlib.suppress(InputError):
+                yield Store.open(path)
 
 
 def _jobs(store: Store) -> list[Job]:

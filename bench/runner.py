@@ -114,11 +114,10 @@ class Run:
         return self.experiment.suite.baseline if self.experiment.suite.baseline in planned else planned[0]
 
     def only(self, jobs: Collection[str]) -> "Run":
-        """The same run with the cells of these job ids alone."""
+        """The same run with the cells of these job ids alone; to do is what was to do when this run was planned."""
         part = copy.copy(self)
-        kept = tuple(cell for cell in self.cells if cell.job.id in jobs)
-        part.experiment = replace(self.experiment, cells=kept)
-        part.todo = [cell for cell in kept if not part._done(cell)]
+        part.experiment = replace(self.experiment, cells=tuple(cell for cell in self.cells if cell.job.id in jobs))
+        part.todo = [cell for cell in self.todo if cell.job.id in jobs]
         return part
 
     def _done(self, cell: Cell) -> bool:

@@ -282,3 +282,18 @@ def test_ctrl_c_on_a_terminal_ends_with_130_and_keeps_what_is_done(faulty_plugin
     assert "interrupted; what is done is kept in" in plain(text)
     assert text.rstrip().endswith("continues")
     assert text.count("\x1b[?25l") == text.count("\x1b[?25h")  # the cursor is back
+
+
+def test_of_earlier_runs_every_method_is_read_and_no_timing_run(faulty_plugin: Path, tmp_path: Path) -> None:
+    from bench.past import Past
+    from bench.runner import Options, Run
+
+    faults = ("fine", "raise", "skip", "slow")
+    bench(*arguments(faulty_plugin, tmp_path / "a", *faults))
+    bench(*arguments(faulty_plugin, tmp_path / "timed", "fine"), "--timing", "--rounds", 2)
+    methods = [f"faulty[fault={fault}]" for fault in faults]
+    planned = Run(None, methods, ["toy"], Options(out=tmp_path / "b", seeds=6, plugins=(faulty_plugin,)))
+    past = Past(planned)
+    assert past.pace.seen == 16
+    assert {past.task(cell.job).configured for cell in planned.cells} == set(methods)
+    assert all(past.pace.knows(past.task(cell.job)) for cell in planned.cells)
