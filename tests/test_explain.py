@@ -14,7 +14,7 @@ from scenes import write_scene
 
 from bench import so3
 from bench.errors import InputError
-from bench.papers.explain import Explained, Setting, candidates, cells, explain, switches
+from bench.papers.explain import Explained, Setting, candidates, cells, explain, switches, together
 from bench.papers.layout import load_layout
 from bench.papers.measure import CHOICES, Answer, Measure
 from bench.papers.published import read_published
@@ -121,6 +121,21 @@ def test_no_switch_is_named_where_none_helps() -> None:
 def test_nothing_measured_is_said() -> None:
     result = explain("Toy", "Ours", "1.0", BASE, list(switches(BASE, METHODS)), lambda *_: ([], "timeout"))
     assert "nothing was measured" in result.sentence()
+
+
+def test_over_several_cells_the_switch_that_explains_all_beats_one_that_explains_one() -> None:
+    def answers(scene: int) -> list[Answer]:
+        return [folded(10 * scene + k, 1.0 + scene) for k in range(3)]
+
+    def cell(scene: int) -> Explained:
+        published = f"{replace(BASE.measure, alignment='karcher').of(answers(scene)):.9f}"
+        tried = [s for s in switches(BASE, ()) if s.name != "protocol"]
+        return explain(f"Scene {scene}", "Ours", published, BASE, tried, lambda *_: (answers(scene), "ok"))
+
+    (sentence,) = together([cell(1), cell(2), cell(3)])
+    assert "Ours, 3 scenes together" in sentence
+    assert sentence.endswith("alignment l1 -> karcher, 0.000.")
+    assert not list(together([cell(1)]))
 
 
 def table() -> tuple[SceneTable, list[dict[str, str]]]:

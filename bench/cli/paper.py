@@ -147,7 +147,7 @@ def _explain(
 ) -> None:
     """Print which switch closes the gap of each cell."""
     from bench.errors import InputError
-    from bench.papers.explain import cells, explain_cell, suites_of
+    from bench.papers.explain import cells, explain_cell, suites_of, together
     from bench.papers.published import SCENE, read_published
     from bench.papers.scenes import SceneTable
     from bench.reporting.paper import explained_grid
@@ -157,14 +157,17 @@ def _explain(
     published = read_published(layout.folder, item.published)
     item.check(published)
     rule = align.value if align else item.alignment
-    for scene, column in (cell for name in names for cell in cells(name, item, published)):
+    done = []
+    for scene, column in dict.fromkeys(cell for name in names for cell in cells(name, item, published)):
         runs, missing = _run(suites_of(item, scene, column, layout.name), layout.name, options)
         if not runs:
             raise InputError(f"--explain '{scene}': {'; '.join(missing)}")
         jobs = [planned_cell.job for planned in runs for planned_cell in planned.cells]
         printed = next(row[column] for row in published if row[SCENE] == scene)
-        explained = explain_cell(item, scene, column, printed, rule, jobs, runs[0].store)
-        _print(explained_grid(explained, rule), explained.rows, format)
+        done.append(explain_cell(item, scene, column, printed, rule, jobs, runs[0].store))
+        _print(explained_grid(done[-1], rule), done[-1].rows, format)
+    for sentence in together(done):
+        typer.echo(sentence, err=format is not Format.CONSOLE)
 
 
 def _print(grid: "Grid", frame: "pd.DataFrame", format: Format) -> None:

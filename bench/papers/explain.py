@@ -172,6 +172,29 @@ def _applies(switch: Switch, answers: Sequence[Answer]) -> bool:
     return switch.name != "seeds" or len(answers) > 1
 
 
+def together(explained: Sequence[Explained]) -> Iterator[str]:
+    """For each column of which several cells were explained, the switch that leaves the smallest gap over all of them.
+
+    What closes one gap may do so by chance, and open the others.
+    """
+    import pandas as pd
+
+    for column in dict.fromkeys(one.column for one in explained):
+        own = [one for one in explained if one.column == column and np.isfinite(one.measured)]
+        if len(own) < 2:
+            continue
+        rows = pd.concat([one.rows for one in own])
+        gaps = rows.groupby(["switch", "before", "after"], sort=False)["gap_after"].agg(["mean", "count"])
+        gaps = gaps[gaps["count"] == len(own)]
+        before = float(np.mean([abs(one.measured - float(one.published)) for one in own]))
+        start = f"{column}, {len(own)} scenes together: mean gap {before:.3f}."
+        if gaps.empty or before - gaps["mean"].min() < NOTICED_DEG:
+            yield f"{start} No single switch makes it smaller."
+            continue
+        name, old, new = gaps["mean"].idxmin()
+        yield f"{start} The switch that leaves least: {name} {old} -> {new}, {gaps['mean'].min():.3f}."
+
+
 def cells(text: str, table: SceneTable, published: Sequence[Mapping[str, str]]) -> list[tuple[str, str]]:
     """Scene and column, in the paper's spelling, of the cells that a name stands for.
 
