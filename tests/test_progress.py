@@ -1,6 +1,5 @@
 """How long a run takes, and what is shown while it runs."""
 
-import fcntl
 import os
 import re
 import select
@@ -230,7 +229,7 @@ def test_a_dry_run_tells_how_long_it_takes(faulty_plugin: Path, tmp_path: Path) 
 def in_terminal(words: Sequence[str], interrupt_at: str = "") -> tuple[str, int]:
     """Run ``python -m bench`` on a pseudo-terminal of 80 by 24; what it wrote, and its exit code."""
     pty = pytest.importorskip("pty")
-    termios = pytest.importorskip("termios")
+    fcntl, termios = pytest.importorskip("fcntl"), pytest.importorskip("termios")
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
     environment = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "LINES", "NO_COLOR")}
