@@ -20,6 +20,7 @@ from bench.papers.measure import CHOICES, Answer, Measure
 from bench.papers.published import read_published
 from bench.papers.scenes import SceneTable
 from bench.problem import Checkpoint, Estimate, Floats, Instance
+from bench.reporting.explained import explained_grid
 
 METHODS = ("ours", "theirs")
 BASE = Setting("ours", "truth-subgraph", Measure())
@@ -116,6 +117,19 @@ def test_no_switch_is_named_where_none_helps() -> None:
     assert "They agree in the digits that are printed." in explained(published).sentence()
     far = explained(f"{max(numbers) + 50:.1f}").sentence()
     assert "which is not there yet" in far
+
+
+def test_what_did_not_end_well_is_a_row_with_its_status_and_never_the_closest() -> None:
+    def answers(method: str, protocol: str) -> tuple[Sequence[Answer], str]:
+        return ([], "timeout") if method == "theirs" else (ANSWERS[method, protocol], "ok")
+
+    result = explain("Toy", "Ours", "9.0", BASE, list(switches(BASE, METHODS)), answers)
+    rows = dict(explained_grid(result, "l1").rows)
+    failed = rows["method", "ours", "theirs"]
+    assert [cell.text for cell in failed][::2] == ["TO", "–"]
+    bold = [facts for facts, cells in rows.items() if cells[0].bold]
+    assert len(bold) == 1
+    assert f"{bold[0][0]} {bold[0][1]} -> {bold[0][2]}" in result.sentence()
 
 
 def test_nothing_measured_is_said() -> None:

@@ -30,16 +30,16 @@ def paper(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the run.  [default: results/runs/PAPER]")
     ] = None,
+    explain: Annotated[
+        list[str] | None,
+        typer.Option("--explain", metavar="CELL", help="Which single switch closes the gap of SCENE/COLUMN? Repeats."),
+    ] = None,
     align: Annotated[
         Align | None, typer.Option(help="Rule that removes the gauge; re-scores.  [default: the paper's]")
     ] = None,
     seeds: Annotated[int | None, typer.Option(metavar="N", help="Seeds 0 to N-1 of what is computed.")] = None,
     jobs: Annotated[int | None, typer.Option(metavar="N", help="Jobs at a time.  [default: one a core]")] = None,
     format: Format = Format.CONSOLE,
-    explain: Annotated[
-        list[str] | None,
-        typer.Option("--explain", metavar="CELL", help="Which single switch closes the gap of SCENE/COLUMN? Repeats."),
-    ] = None,
 ) -> None:
     """Run what is not done, then print measured | published | difference; a figure is drawn too.
 
@@ -150,7 +150,7 @@ def _explain(
     from bench.papers.explain import cells, explain_cell, suites_of, together
     from bench.papers.published import SCENE, read_published
     from bench.papers.scenes import SceneTable
-    from bench.reporting.paper import explained_grid
+    from bench.reporting.explained import explained_grid
 
     if not isinstance(item, SceneTable):
         raise InputError("--explain takes a table of scenes, such as table1")

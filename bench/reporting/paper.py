@@ -8,7 +8,6 @@ import pandas as pd
 from bench import selection
 from bench.papers.computed import Computed
 from bench.papers.curves import CurvePlot
-from bench.papers.explain import Explained
 from bench.papers.properties import PropertyTable
 from bench.papers.published import FACTS
 from bench.papers.scenes import NO_TRUTH, NOT_ON_DISK, PUBLISHED_ONLY, SceneTable
@@ -71,28 +70,6 @@ def scene_grid(table: SceneTable, frame: pd.DataFrame, computed: Computed, align
     )
 
 
-def explained_grid(explained: Explained, alignment: str) -> Grid:
-    """A row for each switch, those that come closest first."""
-    rows = []
-    for row in explained.rows.sort_values("gap_after", kind="stable").itertuples():
-        closes = row.gap_before - row.gap_after
-        shown = (
-            Cell(_measured(row, 3), closes == (explained.rows["gap_before"] - explained.rows["gap_after"]).max() > 0),
-            Cell(_fixed(row.gap_before, 3)),
-            Cell(_fixed(row.gap_after, 3)),
-            Cell(_signed(-closes, 3)),
-        )
-        rows.append(((str(row.switch), str(row.before), str(row.after)), shown))
-    return Grid(
-        caption=f"{explained.scene} / {explained.column}: measured {explained.measured:.3f} ({alignment} alignment), "
-        f"published {explained.published}; every row changes one thing",
-        facts=("switch", "from", "to"),
-        methods=(("measured", ""), ("gap before", ""), ("gap after", ""), ("change", "")),
-        rows=tuple(rows),
-        notes=(explained.sentence(),),
-    )
-
-
 def _marks(frame: pd.DataFrame, computed: Computed) -> dict[str, tuple[str, str]]:
     """A letter and what it says for each instance whose data or truth are not the paper's."""
     noted = {name: "; ".join(notes) for name, notes in (computed.notes or {}).items() if notes}
@@ -127,10 +104,10 @@ def _scene_notes(
     yield from (f"{sentence[0].upper()}{sentence[1:]}." for sentence in computed.missing)
 
 
-def _measured(row: "object", digits: int = _ERROR_DIGITS) -> str:
+def _measured(row: "object") -> str:
     measured, status = float(row.measured), str(row.status)  # type: ignore[attr-defined]
     if math.isfinite(measured):
-        return f"{measured:.{digits}f}"
+        return f"{measured:.{_ERROR_DIGITS}f}"
     return {PUBLISHED_ONLY: ABSENT, NO_TRUTH: UNKNOWN}.get(status) or abbreviated(status)
 
 
