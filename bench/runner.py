@@ -1,10 +1,11 @@
 """Run an experiment into a store: plan, prepare the instances, run what is not done."""
 
 import contextlib
+import copy
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -132,6 +133,13 @@ class Run:
         """The suite's baseline as it is in tables, or the first method where that was not chosen."""
         planned = [format_selection(cell.job.method, cell.job.parameters) for cell in self.cells]
         return self.experiment.suite.baseline if self.experiment.suite.baseline in planned else planned[0]
+
+    def only(self, jobs: Collection[str]) -> "Run":
+        """The same run with the cells of these job ids alone; to do is what was to do when this run was planned."""
+        part = copy.copy(self)
+        part.experiment = replace(self.experiment, cells=tuple(cell for cell in self.cells if cell.job.id in jobs))
+        part.todo = [cell for cell in self.todo if cell.job.id in jobs]
+        return part
 
     def _done(self, cell: Cell) -> bool:
         if self.options.rerun == "always":

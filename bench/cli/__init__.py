@@ -8,7 +8,23 @@ import sys
 
 import typer
 
-from bench.cli import bibtex, check, compare, data, doctor, list_, merge, new, paper, plot, rerun, run, solve, table
+from bench.cli import (
+    bibtex,
+    check,
+    compare,
+    data,
+    doctor,
+    list_,
+    map,
+    merge,
+    new,
+    paper,
+    plot,
+    rerun,
+    run,
+    solve,
+    table,
+)
 
 REFUSED = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
@@ -29,6 +45,7 @@ app.command("paper")(paper.paper)
 app.command("merge")(merge.merge)
 app.command("doctor")(doctor.doctor)
 app.command("bibtex")(bibtex.bibtex)
+app.command("map", epilog=map.EPILOG)(map.map_)
 app.add_typer(data.app, name="data")
 app.command("solve")(solve.solve)
 app.command("new")(new.new)

@@ -10,8 +10,8 @@ from bench.cli.options import RunFolder, run_folder
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bench.registry import Info
     from bench.plan import Job
+    from bench.registry import Info
 
 
 def bibtex(run: RunFolder) -> None:

@@ -11,13 +11,16 @@ from bench.cli.options import Align, DataDirOption, Format, StyleOption, wear
 from bench.cli.progress import execute
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from bench.experiment import Suite
     from bench.papers.computed import Computed
     from bench.papers.layout import Item, Layout
     from bench.reporting.grid import Grid
-    from bench.runner import Options
+    from bench.runner import Options, Run
 
 
 def paper(
@@ -26,6 +29,10 @@ def paper(
     data_dir: DataDirOption = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the run.  [default: results/runs/PAPER]")
+    ] = None,
+    explain: Annotated[
+        list[str] | None,
+        typer.Option("--explain", metavar="CELL", help="Which single switch closes the gap of SCENE/COLUMN? Repeats."),
     ] = None,
     align: Annotated[
         Align | None, typer.Option(help="Rule that removes the gauge; re-scores.  [default: the paper's]")
@@ -38,6 +45,9 @@ def paper(
     """Run what is not done, then print measured | published | difference; a figure is drawn too.
 
     The table goes to standard output, everything else to standard error.
+
+    With --explain, alignment, protocol, statistic, angle and method are toggled one at a time instead, and the one
+    that moves our number closest to the published one is named.
     """
     from bench.papers.curves import CurvePlot
     from bench.papers.layout import load_layout
@@ -48,12 +58,15 @@ def paper(
     wear(style)
     layout = load_layout(paper)
     chosen = layout.item(item)
+    folder = out or RUNS_FOLDER / layout.name
+    options = Options(out=folder, data_dir=data_dir, seeds=seeds, jobs=jobs)
+    if explain:
+        _explain(chosen, layout, explain, options, align, format)
+        return
     if isinstance(chosen, PropertyTable):
         frame = chosen.compare()
         _print(tables.property_grid(chosen, frame), frame, format)
         return
-    folder = out or RUNS_FOLDER / layout.name
-    options = Options(out=folder, data_dir=data_dir, seeds=seeds, jobs=jobs)
     rule = align.value if align else chosen.alignment
     computed = _computed(chosen, layout.name, options, rule)
     grid, frame = _compared(chosen, layout, computed, rule, format)
@@ -97,11 +110,24 @@ def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Comput
     from bench.papers.computed import Computed
     from bench.papers.speedup import Speedup
     from bench.results import score
+
+    runs, missing = _run(item.suites(name), name, options)
+    if not runs:
+        return Computed(missing=tuple(missing))
+    store = runs[0].store
+    jobs = [cell.job for planned in runs for cell in planned.cells]
+    notes = {job.instance: store.instance(key).notes for key, job in {job.instance_key: job for job in jobs}.items()}
+    scores = score(store, rule, jobs=jobs, oracle=isinstance(item, Claims), checkpoints=isinstance(item, Speedup))
+    return Computed(jobs, scores, notes, tuple(missing), lambda job: store.instance(job.instance_key))
+
+
+def _run(suites: "Sequence[Suite]", name: str, options: "Options") -> "tuple[list[Run], list[str]]":
+    """Run what is not done; the runs, and a sentence for what is not on disk."""
     from bench.runner import NothingToRunError, Run
 
     missing: list[str] = []
     runs = []
-    for suite in item.suites(name):
+    for suite in suites:
         try:
             planned = Run(suite, options=options)
         except NothingToRunError as nothing:
@@ -114,13 +140,40 @@ def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Comput
         execute(planned, stderr=True)
         missing += planned.experiment.missing
         runs.append(planned)
-    if not runs:
-        return Computed(missing=tuple(missing))
-    store = runs[0].store
-    jobs = [cell.job for planned in runs for cell in planned.cells]
-    notes = {job.instance: store.instance(key).notes for key, job in {job.instance_key: job for job in jobs}.items()}
-    scores = score(store, rule, jobs=jobs, oracle=isinstance(item, Claims), checkpoints=isinstance(item, Speedup))
-    return Computed(jobs, scores, notes, tuple(missing), lambda job: store.instance(job.instance_key))
+    return runs, missing
+
+
+def _explain(
+    item: "Item",
+    layout: "Layout",
+    names: list[str],
+    options: "Options",
+    align: Align | None,
+    format: Format,
+) -> None:
+    """Print which switch closes the gap of each cell."""
+    from bench.errors import InputError
+    from bench.papers.explain import cells, explain_cell, suites_of, together
+    from bench.papers.published import SCENE, read_published
+    from bench.papers.scenes import SceneTable
+    from bench.reporting.explained import explained_grid
+
+    if not isinstance(item, SceneTable):
+        raise InputError("--explain takes a table of scenes, such as table1")
+    published = read_published(layout.folder, item.published)
+    item.check(published)
+    rule = align.value if align else item.alignment
+    done = []
+    for scene, column in dict.fromkeys(cell for name in names for cell in cells(name, item, published)):
+        runs, missing = _run(suites_of(item, scene, column, layout.name), layout.name, options)
+        if not runs:
+            raise InputError(f"--explain '{scene}': {'; '.join(missing)}")
+        jobs = [planned_cell.job for planned in runs for planned_cell in planned.cells]
+        printed = next(row[column] for row in published if row[SCENE] == scene)
+        done.append(explain_cell(item, scene, column, printed, rule, jobs, runs[0].store))
+        _print(explained_grid(done[-1], rule), done[-1].rows, format)
+    for sentence in together(done):
+        typer.echo(sentence, err=format is not Format.CONSOLE)
 
 
 def _print(grid: "Grid", frame: "pd.DataFrame", format: Format) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench.cli.options import Align, AlignOption, DataDirOption, Engine, PluginOption, ProtocolOption, Rerun, wear
-from bench.cli.progress import execute
+from bench.cli.progress import execute, foreseen
 
 if TYPE_CHECKING:
     from bench.runner import Run
@@ -125,6 +125,8 @@ def _list_cells(planned: "Run") -> None:
         typer.echo(f"{state:<7} {job.dataset} {job.instance} seed {job.seed} {method}")
     for sentence in planned.experiment.missing:
         typer.echo(f"missing: {sentence}")
+    if planned.todo:
+        typer.echo(foreseen(planned))
 
 
 def _present(planned: "Run", align: Align) -> None:

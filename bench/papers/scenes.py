@@ -1,7 +1,7 @@
 """A published table of errors, a row for each scene and a column for each method, beside our own."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -48,6 +48,8 @@ class SceneTable:
         reference column's first is the reference among what is measured.
     scenes
         The paper's name of each scene, and ours.
+    variants
+        For each published column further selections that could stand for it; `bench.papers.explain` tries them.
     seeds, timeout_s, memory_gib
         As in a suite.
     """
@@ -62,6 +64,7 @@ class SceneTable:
     highlight_deg: float
     measured: Mapping[str, tuple[str, ...]]
     scenes: Mapping[str, str]
+    variants: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     seeds: int = 1
     timeout_s: float = 600.0
     memory_gib: float = 8.0
@@ -92,14 +95,16 @@ class SceneTable:
         import pandas as pd
 
         columns = methods_of(published)
-        self._check(published, columns)
+        self.check(published)
         return pd.DataFrame([row for scene in published for row in self._scene(scene, columns, computed)])
 
-    def _check(self, published: Sequence[Mapping[str, str]], columns: Sequence[str]) -> None:
+    def check(self, published: list[dict[str, str]]) -> None:
+        """Raise InputError where the layout and the published file do not fit together."""
+        columns = methods_of(published)
         for column in (*columns, self.highlight_reference):
             if column not in self.measured:
                 raise InputError(f"{self.published}: the layout's 'measured' has no entry for column '{column}'")
-        for column in self.measured:
+        for column in (*self.measured, *self.variants):
             if column not in columns:
                 raise InputError(f"{self.published} has no column '{column}'{suggestion(column, columns)}")
         for row in published:

@@ -16,6 +16,7 @@ from bench.registry import suggestion
 NOISES = ("tangent", "langevin")
 MOST_TANGENT_DEG = 30.0
 STEPS = 20_001
+MAXWELL_MEDIAN = 1.5381722544550522  # of the length of a Gaussian vector with covariance I
 TAIL = 12  # standard deviations, beyond which there is nothing to integrate
 
 
@@ -72,6 +73,15 @@ def efficient_mean_deg(problem: Problem, inliers: NDArray[np.bool_], noise: str,
     """
     variances = _variances(problem, inliers, noise, noise_deg)
     return float(np.degrees(np.sqrt(8 * variances / np.pi)).mean())
+
+
+def efficient_median_deg(problem: Problem, inliers: NDArray[np.bool_], noise: str, noise_deg: float) -> float:
+    """Median error over the cameras, in degrees, of an estimator as in `efficient_mean_deg`; NaN without connection.
+
+    The median over the cameras of the median length of a Gaussian vector with covariance c_i I.
+    """
+    variances = _variances(problem, inliers, noise, noise_deg)
+    return float(np.degrees(MAXWELL_MEDIAN * np.sqrt(np.median(variances))))
 
 
 def information(noise: str, noise_deg: float) -> float:

@@ -1,0 +1,1 @@
+"""Phase maps: where, over two parameters of a simulated dataset, each method breaks down."""

@@ -1,0 +1,257 @@
+"""A phase map in the making: samples are ordinary jobs of an ordinary run, asked for round by round."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bench import registry, selection
+from bench.errors import InputError
+from bench.execution import outcome
+from bench.experiment import Cell, Suite
+from bench.maps.adaptive import Sample, Tally, every_sample, next_samples
+from bench.maps.axes import Axis
+from bench.maps.bounds import Drawn
+from bench.maps.criterion import Criterion, median_of_all
+from bench.problem import Instance
+from bench.registry import Info
+from bench.runner import Options, Run
+from bench.scoring.errors import camera_errors
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What a map is of.
+
+    Parameters
+    ----------
+    methods, dataset
+        Selections; the dataset's is one configuration, without the parameters of the axes.
+    x, y
+        The two parameters that are varied.
+    seeds
+        Samples of a cell, at most; its outcome is that of more than half of them, so odd numbers are best.
+    success, alignment
+        What counts as success, and the rule that removes the gauge.
+    """
+
+    methods: tuple[str, ...]
+    dataset: str
+    x: Axis
+    y: Axis
+    seeds: int
+    success: Criterion
+    alignment: str = "l1"
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Cells along x and along y."""
+        return len(self.x.values), len(self.y.values)
+
+
+@dataclass(frozen=True)
+class _Sampled:
+    """What one job has told."""
+
+    median_deg: float
+    success: bool
+    answered: bool
+
+
+class PhaseMap:
+    """The samples taken so far, and what to take next.
+
+    Parameters
+    ----------
+    sweep
+        What the map is of.
+    options
+        Of the run; `seeds` and the suite's selections come from the sweep.
+
+    Raises
+    ------
+    InputError
+        On anything that the user has to change; nothing is written then.
+    """
+
+    def __init__(self, sweep: Sweep, options: Options) -> None:
+        self.sweep = sweep
+        self.dataset, given = one_dataset(sweep.dataset, options.plugins)
+        for axis in (sweep.x, sweep.y):
+            if axis.parameter in given:
+                raise InputError(f"'{axis.parameter}' is an axis of the map; leave it out of '{sweep.dataset}'")
+        if sweep.x.parameter == sweep.y.parameter:
+            raise InputError(f"both axes are '{sweep.x.parameter}'; a map needs two parameters")
+        self.parameters = {**self.dataset.defaults(), **given}
+        sweep.success.check(self.parameters)
+        self.run = Run(_suite(sweep, self.dataset, given), options=replace(options, seeds=None))
+        self._cells = self._indexed(given)
+        self.methods = tuple(dict.fromkeys(method for method, _ in self._cells))
+        self.tallies = {method: Tally.empty(sweep.shape, sweep.seeds) for method in self.methods}
+        self._samples: dict[str, dict[tuple[int, int], list[_Sampled]]] = {method: {} for method in self.methods}
+
+    @property
+    def taken(self) -> int:
+        """Samples that the map stands on."""
+        return int(sum(tally.tried.sum() for tally in self.tallies.values()))
+
+    @property
+    def grid(self) -> int:
+        """Samples of the full grid."""
+        return len(self._cells)
+
+    def explore(
+        self,
+        execute: Callable[[Run], None],
+        *,
+        full: bool = False,
+        budget: int | None = None,
+        tell: Callable[[str], None] = lambda _: None,
+    ) -> bool:
+        """Sample until the boundary of every method is known.
+
+        Parameters
+        ----------
+        execute
+            Runs what a run has to do.
+        full
+            Take every sample of the grid instead.
+        budget
+            Take no more samples than that, those of earlier calls on the same folder among them.
+        tell
+            Is told what each round is.
+
+        Returns
+        -------
+        Whether the map is complete; False where the budget ended before.
+        """
+        wanted = every_sample if full else next_samples
+        number = 0
+        while batch := [(method, s) for method, tally in self.tallies.items() for s in wanted(tally)]:
+            left = len(batch) if budget is None else budget - self.taken
+            batch = sorted(batch, key=lambda entry: entry[1])[: max(left, 0)]
+            if not batch:
+                return False
+            number += 1
+            part = self.run.only({self._cells[entry].job.id for entry in batch})
+            stored = len(batch) - len(part.todo)
+            tell(f"round {number}: {len(batch)} samples{f', {stored} of them stored' if stored else ''}")
+            if part.todo:
+                part.prepare()
+                execute(part)
+            for method, sample in batch:
+                self._count(method, sample)
+        return True
+
+    def frame(self) -> "pd.DataFrame":
+        """The map, one row for each method and cell.
+
+        Returns
+        -------
+        DataFrame
+            ``method``, the two parameters, ``samples, successes, failed`` (without an answer), ``median_deg`` (mean
+            over the samples that have an answer) and ``success``: whether more than half of the samples succeed, or in
+            a cell without any, whether the nearest sampled cell does.
+        """
+        import pandas as pd
+
+        rows = []
+        for method, tally in self.tallies.items():
+            expected = tally.expected()
+            for x, y in np.ndindex(*self.sweep.shape):
+                told = self._samples[method].get((x, y), [])
+                medians = [sampled.median_deg for sampled in told if sampled.answered]
+                rows.append(
+                    {
+                        "method": method,
+                        self.sweep.x.parameter: self.sweep.x.values[x],
+                        self.sweep.y.parameter: self.sweep.y.values[y],
+                        "samples": len(told),
+                        "successes": int(tally.hits[x, y]),
+                        "failed": len(told) - len(medians),
+                        "median_deg": float(np.mean(medians)) if medians else np.nan,
+                        "success": bool(expected[x, y]),
+                    }
+                )
+        return pd.DataFrame(rows)
+
+    def problems(self) -> Iterator[Drawn]:
+        """Every cell's place, complete parameters and instances, made anew: most are never solved."""
+        first = self.methods[0]
+        for x, y in np.ndindex(*self.sweep.shape):
+            sources = [self._cells[first, (x, y, seed)].source for seed in range(self.sweep.seeds)]
+            yield (x, y), self.parameters | self._varied(x, y), (source.load() for source in sources)
+
+    def _varied(self, x: int, y: int) -> dict[str, Any]:
+        return _varied(self.sweep, x, y)
+
+    def _indexed(self, given: dict[str, Any]) -> dict[tuple[str, Sample], Cell]:
+        """Every cell of the experiment by the method and the sample that it is."""
+        places = {
+            selection.format_selection(self.dataset.name, given | self._varied(x, y)): (x, y)
+            for x, y in np.ndindex(*self.sweep.shape)
+        }
+        found = {}
+        for cell in self.run.cells:
+            if cell.method.not_installed:
+                raise InputError(f"method '{cell.method.name}' is not installed: {cell.method.install_hint}")
+            job = cell.job
+            method = selection.format_selection(job.method, dict(job.parameters))
+            found[method, (*places[job.dataset], job.seed)] = cell
+        methods = {method for method, _ in found}
+        if len(found) != len(methods) * len(places) * self.sweep.seeds:
+            raise InputError(f"dataset '{self.dataset.name}' is not drawn anew for every seed; a map needs one that is")
+        return found
+
+    def _count(self, method: str, sample: Sample) -> None:
+        cell = self._cells[method, sample]
+        store = self.run.store
+        record = store.record(cell.job.id)
+        told = _Sampled(np.inf, False, False)
+        if record is not None and record["outcome"] == outcome.OK:
+            instance = self._instance(cell.job.instance_key)
+            if instance.truth is None:
+                raise InputError(f"dataset '{self.dataset.name}' has no truth to tell success by")
+            errors = camera_errors(store.estimate(cell.job.id).rotations, instance.truth, self.sweep.alignment)
+            median = median_of_all(errors[np.isfinite(instance.truth).all(axis=(1, 2))])
+            met = self.sweep.success.met(median, instance, self.parameters | self._varied(*sample[:2]))
+            told = _Sampled(median, met, True)
+        self.tallies[method].add(sample, told.success)
+        self._samples[method].setdefault(sample[:2], []).append(told)
+
+    def _instance(self, key: str) -> Instance:
+        """The last instance is kept: the methods of a batch come one after another on it."""
+        if getattr(self, "_last", ("", None))[0] != key:
+            self._last = key, self.run.store.instance(key)
+        return self._last[1]
+
+
+def one_dataset(text: str, plugins: Sequence[Path]) -> tuple[Info, dict[str, Any]]:
+    """A dataset and the parameters given, from a selection that stands for one configuration.
+
+    Raises
+    ------
+    InputError
+        Where it stands for several, or for something unknown.
+    """
+    chosen = registry.catalog("dataset", plugins).select([text])
+    if len(chosen) != 1:
+        raise InputError(f"a map is of one dataset, and '{text}' stands for {len(chosen)}")
+    return chosen[0]
+
+
+def _suite(sweep: Sweep, dataset: Info, given: dict[str, Any]) -> Suite:
+    cells = tuple(
+        selection.format_selection(dataset.name, given | _varied(sweep, x, y)) for x, y in np.ndindex(*sweep.shape)
+    )
+    title = f"{sweep.x.parameter} x {sweep.y.parameter}"
+    return Suite("map", title, cells, sweep.methods, sweep.seeds)
+
+
+def _varied(sweep: Sweep, x: int, y: int) -> dict[str, Any]:
+    return {sweep.x.parameter: sweep.x.values[x], sweep.y.parameter: sweep.y.values[y]}
