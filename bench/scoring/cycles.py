@@ -32,8 +32,8 @@ class Cycles:
 def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
     """Triangles drawn uniformly and with replacement; the same ones for the same graph.
 
-    Paths a - c - b are drawn uniformly, the middle c in proportion to the number of its pairs of neighbours; those that an
-    edge (a, b) closes are kept. Every triangle is closed from three paths, so none is preferred.
+    Paths a - c - b are drawn uniformly, the middle c in proportion to the number of its pairs of neighbours; those
+    that an edge (a, b) closes are kept. Every triangle is closed from three paths, so none is preferred.
 
     Parameters
     ----------
@@ -57,12 +57,9 @@ def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
     closed = closing >= 0
     edges = np.stack([graph.data[one] - 1, graph.data[other] - 1, closing], axis=1).astype(np.intp)[closed]
     a, b, c = a[closed], b[closed], middle[closed]
-    around = (
-        _directed(problem, edges[:, 0], a, c)
-        @ _directed(problem, edges[:, 1], c, b)
-        @ _directed(problem, edges[:, 2], b, a)
-    )
-    return Cycles(edges, np.degrees(so3.angle(around)))
+    sides = ((0, a, c), (1, c, b), (2, b, a))
+    ac, cb, ba = (_directed(problem, edges[:, k], start, end) for k, start, end in sides)
+    return Cycles(edges, np.degrees(so3.angle(ac @ cb @ ba)))
 
 
 def agreeing_share(cycles: Cycles, at_truth: Floats) -> float:
