@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from bench.cli import check, data, list_, new, paper, plot, run, solve, table
+from bench.cli import check, data, list_, new, paper, plot, report, run, solve, table
 
 app = typer.Typer(
     name="bench",
@@ -20,6 +20,7 @@ app.command("run", epilog=run.EPILOG)(run.run)
 app.command("list")(list_.list_)
 app.command("table")(table.table)
 app.command("plot")(plot.plot)
+app.command("report")(report.report)
 app.command("paper")(paper.paper)
 app.add_typer(data.app, name="data")
 app.command("solve")(solve.solve)
