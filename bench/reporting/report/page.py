@@ -15,6 +15,7 @@ from bench.reporting.report.embed import compact
 from bench.reporting.report.failures import Failure, failures, notes
 from bench.reporting.report.leaderboard import leaderboard
 from bench.reporting.report.origin import Facts, origin
+from bench.reporting.report.scene import sections as forensics
 from bench.reporting.report.section import SceneSections, Section, Table, Value, anchor
 from bench.reporting.report.standing import standings
 from bench.reporting.rows import Scene, is_timed
@@ -24,7 +25,7 @@ from bench.scoring.alignment import RULES
 from bench.store import Store
 
 FILE_NAME = "report.html"
-SCENE_PARTS: tuple[SceneSections, ...] = (overview.scene_sections,)
+SCENE_PARTS: tuple[SceneSections, ...] = (overview.scene_sections, forensics)
 
 
 @dataclass(frozen=True)
