@@ -48,6 +48,6 @@ def share_of(instance: Instance) -> float:
 
 
 def test_outliers_that_agree_close_their_cycles() -> None:
-    assert share_of(load(ErdosRenyi(noise_deg=1.0))) < 0.001
-    assert share_of(load(Folded(noise_deg=1.0, outliers=0.0, agreeing=1.0))) == pytest.approx(1)
-    assert 0.03 < share_of(load(Folded(noise_deg=1.0))) < 0.9
+    assert share_of(load(ErdosRenyi())) < 0.01
+    assert share_of(load(Folded(noise_deg=1.0, outliers=0.0, agreeing=1.0))) == pytest.approx(1, abs=0.1)
+    assert 0.03 < share_of(load(Folded())) < 0.5

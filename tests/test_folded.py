@@ -189,7 +189,7 @@ def test_wrong_measurements_that_agree_fold_a_robust_estimate() -> None:
     assert len(part) == 50
     assert len(np.intersect1d(fold.cameras, part)) >= 0.95 * max(len(part), len(fold.cameras))
     assert fold.angle_deg == pytest.approx(25, abs=2)
-    agree, across = border(problem, rotations, truth, fold.cameras)
+    agree, across = border(problem, problem.residuals(rotations), problem.residuals(truth), fold.cameras)
     assert 0.6 < agree / across < 0.8
 
 

@@ -10,7 +10,6 @@ from bench.problem import Floats, Problem
 
 SAMPLE = 20_000
 WRONG_DEG = 10.0
-CLOSED_DEG = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,21 +62,25 @@ def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
 
 
 def agreeing_share(cycles: Cycles, at_truth: Floats) -> float:
-    """Share of the triangles with a wrong edge that close all the same: of outliers that agree with each other.
+    """Share of the triangles with a wrong edge that close all the same: of wrong edges that agree with each other.
 
-    Independent outliers close next to none. NaN where no triangle has a wrong edge.
+    Twice the share that closes as well as the better half of the triangles without a wrong edge, and at most 1. Of
+    independent errors it is next to zero. NaN where there are no triangles of either kind.
 
     Parameters
     ----------
     cycles
         Triangles.
     at_truth
-        (m,) residuals of the edges at the truth, degrees; from `WRONG_DEG` on an edge is wrong. NaN where unknown; such
+        (m,) residuals of the edges at the truth, degrees; above `WRONG_DEG` an edge is wrong. NaN where unknown; such
         triangles take no part.
     """
-    worst = at_truth[cycles.edges].max(axis=1, initial=0)
-    wrong = worst > WRONG_DEG
-    return float((cycles.residuals[wrong] < CLOSED_DEG).mean()) if wrong.any() else float("nan")
+    worst = at_truth[cycles.edges].max(axis=1, initial=-np.inf)
+    wrong, right = worst > WRONG_DEG, worst <= WRONG_DEG
+    if not wrong.any() or not right.any():
+        return float("nan")
+    closing = cycles.residuals[wrong] <= np.median(cycles.residuals[right])
+    return min(1.0, 2 * float(closing.mean()))
 
 
 def _directed(problem: Problem, edges: NDArray[np.intp], start: NDArray[np.intp], end: NDArray[np.intp]) -> Floats:

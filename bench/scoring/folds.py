@@ -156,15 +156,15 @@ def shared_folds(folds: Mapping[Key, Sequence[Fold]]) -> list[SharedFold[Key]]:
     return [SharedFold(_in_half(list(group.values())), group) for group in groups]
 
 
-def border(problem: Problem, rotations: Floats, truth: Floats, cameras: Ids) -> tuple[int, int]:
+def border(problem: Problem, at_estimate: Floats, at_truth: Floats, cameras: Ids) -> tuple[int, int]:
     """Whether the measurements are turned as well: how many edges into the fold fit the estimate better than the truth.
 
     Parameters
     ----------
     problem
-        The measurements.
-    rotations, truth
-        (n, 3, 3), NaN where not solved or unknown.
+        The graph.
+    at_estimate, at_truth
+        (m,) residuals; NaN where a camera is not solved or not known. They do not depend on the gauge.
     cameras
         (k,) ids of the fold.
 
@@ -172,10 +172,8 @@ def border(problem: Problem, rotations: Floats, truth: Floats, cameras: Ids) -> 
     -------
     tuple
         The number of those edges, and of all edges between the fold and other cameras that are solved and known.
-        The residuals do not depend on the gauge.
     """
     inside = np.isin(problem.edges, cameras)
-    at_estimate, at_truth = problem.residuals(rotations), problem.residuals(truth)
     across = (inside[:, 0] != inside[:, 1]) & np.isfinite(at_estimate) & np.isfinite(at_truth)
     return int((at_estimate < at_truth)[across].sum()), int(across.sum())
 

@@ -10,11 +10,12 @@ from bench.reporting.report import figures, words
 from bench.reporting.report.case import Case, Solved
 from bench.reporting.report.section import FigureDict, Section, Table, Value, anchor
 from bench.reporting.rows import area
-from bench.scoring.cycles import CLOSED_DEG, WRONG_DEG, agreeing_share, sample_cycles
+from bench.scoring.cycles import WRONG_DEG, agreeing_share, sample_cycles
 from bench.scoring.roc import roc_curve
 
 BINS = np.geomspace(0.1, 180, 41)  # degrees
-NEXT_TO_NONE = 0.01
+NEXT_TO_NONE = 0.05
+CLOSED_DEG = 5.0
 SAME_COST = 0.001  # relative
 
 
@@ -26,12 +27,12 @@ def cycle_section(case: Case) -> list[Section]:
     closed = 100 * float((cycles.residuals < CLOSED_DEG).mean())
     found = [
         f"Median residual of a triangle: {np.median(cycles.residuals):.2g}°; {closed:.0f} % close to within "
-        f"{CLOSED_DEG:g}° (a sample of {len(cycles.residuals)})."
+        f"{CLOSED_DEG:g}° (a random sample of {len(cycles.residuals)})."
     ]
     traces = [_histogram(cycles.residuals, "all triangles", "#0072B2")]
     wrong = case.at_truth[cycles.edges].max(axis=1) > WRONG_DEG
-    if wrong.any():
-        found.append(_agreement(agreeing_share(cycles, case.at_truth)))
+    if np.isfinite(share := agreeing_share(cycles, case.at_truth)):
+        found.append(_agreement(share))
         traces.append(_histogram(cycles.residuals[wrong], f"with an edge over {WRONG_DEG:g}° off the truth", "#D55E00"))
     drawn: FigureDict = {
         "data": traces,
@@ -48,10 +49,8 @@ def cycle_section(case: Case) -> list[Section]:
 def _agreement(share: float) -> str:
     about = f"Of the triangles with an edge that is more than {WRONG_DEG:g}° off the truth,"
     if share < NEXT_TO_NONE:
-        return f"{about} next to none close: wrong edges do not agree with each other."
-    return (
-        f"{about} {100 * share:.0f} % close all the same; of independent errors next to none would: wrong edges agree."
-    )
+        return f"{about} next to none close as well as the others do: wrong edges do not agree with each other."
+    return f"{about} about {100 * share:.0f} % close as well as the others do: wrong edges agree with each other."
 
 
 def _histogram(residuals: Floats, name: str, color: str) -> dict[str, object]:
@@ -119,8 +118,8 @@ def _cost_words(case: Case) -> tuple[str, ...]:
     found = []
     if below:
         found.append(
-            f"{_who(below, case)} explained the measurements better than the truth does, in l1 or in l2: what is wrong "
-            "there is the optimum of the wrong cost, and a better search would not help."
+            f"{_who(below, case)} explain the measurements better than the truth does, in l1 or in l2: what is wrong "
+            "comes from the measurements and the cost, and a better search would not find the truth."
         )
     if above:
         found.append(

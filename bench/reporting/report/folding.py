@@ -3,9 +3,9 @@
 import numpy as np
 
 from bench.reporting.report import words
-from bench.reporting.report.case import Case
+from bench.reporting.report.case import Case, Solved
 from bench.reporting.report.section import Section, Table, Value, anchor
-from bench.scoring.folds import MIN_ANGLE_DEG, MIN_SHARE, Ids, SharedFold, border, shared_folds
+from bench.scoring.folds import MIN_ANGLE_DEG, MIN_SHARE, Fold, Ids, SharedFold, border, shared_folds
 
 LISTED = 200  # cameras
 ALIKE_DEG = 2.0  # a range of angles that is told as one
@@ -68,21 +68,23 @@ def _angles(part: SharedFold[str]) -> str:
 
 
 def _range(low: float, high: float) -> str:
-    return f"{high:.1f}°" if high - low < 0.05 else f"{low:.1f}° to {high:.1f}°"
+    ends = f"{low:.1f}°", f"{high:.1f}°"
+    return " to ".join(dict.fromkeys(ends))
 
 
 def _cause(case: Case, part: SharedFold[str]) -> str:
     """Whether the measurements are turned too, by the best estimate that has the fold."""
     solved = next(s for s in case.solved if s.label in part.folds)
-    truth = case.instance.truth
-    if truth is None:
-        return ""
-    agree, across = border(case.instance.problem, solved.rotations, truth, part.folds[solved.label].cameras)
+    agree, across = _border(case, solved, part.folds[solved.label])
     if across == 0:
         return "No edge joins them to the other cameras, so nothing is measured of how they lie to each other."
     share = f"{100 * agree / across:.0f} % agree better with the estimate of {solved.label} than with the truth"
     why = "the measurements are turned, or the truth is" if 2 * agree > across else "the measurements are not to blame"
     return f"Of the {across} edges that join them to the others, {share}: {why}."
+
+
+def _border(case: Case, solved: Solved, fold: Fold) -> tuple[int, int]:
+    return border(case.instance.problem, solved.residuals, case.at_truth, fold.cameras)
 
 
 def _ids(cameras: Ids) -> str:
@@ -98,7 +100,21 @@ def _table(case: Case, shared: list[SharedFold[str]]) -> Table:
             fold = part.folds.get(solved.label)
             if fold is not None:
                 axis = ", ".join(f"{x:.2f}" for x in fold.axis)
-                numbers = (len(fold.cameras), round(fold.angle_deg, 2), axis, fold.spread_deg, fold.main_spread_deg)
-                rows.append((solved.label, *numbers))
-    head = ("Method", "Cameras", "Turned by °", "Axis in the world", "Spread °", "Spread of the rest °")
-    return Table("Turned parts of each estimate; spread is the median distance of the cameras", head, tuple(rows))
+                agree, across = _border(case, solved, fold)
+                supported = round(100 * agree / across) if across else None
+                spreads = (fold.spread_deg, fold.main_spread_deg)
+                rows.append((solved.label, len(fold.cameras), fold.angle_deg, axis, *spreads, supported))
+    head = (
+        "Method",
+        "Cameras",
+        "Turned by °",
+        "Axis in the world",
+        "Spread °",
+        "Spread of the rest °",
+        "Edges for it %",
+    )
+    caption = (
+        "Turned parts of each estimate. Spread: median distance of the cameras. Edges for it: of those to other "
+        "cameras, how many agree better with the estimate than with the truth"
+    )
+    return Table(caption, head, tuple(rows))

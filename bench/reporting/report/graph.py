@@ -16,6 +16,7 @@ from bench.scoring.folds import Fold
 GRID = 1000
 EDGES = 500  # drawn of each figure
 WORK = 2e8  # pairs of cameras of all iterations together, from which on there are fewer iterations
+NEARER = 0.6  # exponent of the distance from the middle: a few cameras far out leave room for the others
 START = 10  # cameras; below, the layout starts at random
 ERRORS_DEG = (0.1, 0.3, 1, 3, 10, 30, 100)
 # Blue to vermilion of Okabe and Ito's palette over a light grey: both ends stand out on white and on black.
@@ -36,6 +37,9 @@ def layout(problem: Problem) -> Ints:
     iterations = int(np.clip(WORK / problem.n**2, 30, 100))
     placed = rustworkx.spring_layout(graph, pos=start, num_iter=iterations, seed=0)
     positions = np.array([placed[k] for k in range(problem.n)])
+    offset = positions - np.median(positions, axis=0)
+    distance = np.linalg.norm(offset, axis=1, keepdims=True)
+    positions = offset * np.maximum(distance, 1e-12) ** (NEARER - 1)
     low, high = positions.min(axis=0), positions.max(axis=0)
     return np.rint(GRID * (positions - low) / np.maximum(high - low, 1e-12)).astype(np.int32)
 
@@ -91,9 +95,9 @@ def _edges(problem: Problem, positions: Ints, residuals: Floats) -> list[dict[st
     drawn = np.sort(np.random.default_rng(0).permutation(problem.m)[:EDGES])
     value = residuals[drawn]
     layers = (
-        (~(value >= FITTING_DEG), f"edges below {FITTING_DEG:g}°", GREY, 0.25),
-        ((value >= FITTING_DEG) & (value < FAR_DEG), f"{FITTING_DEG:g}° to {FAR_DEG:g}°", "#E69F00", 0.45),
-        (value >= FAR_DEG, f"{FAR_DEG:g}° and more", "#D55E00", 0.45),
+        (~(value >= FITTING_DEG), f"edges below {FITTING_DEG:g}°", GREY, 0.35),
+        ((value >= FITTING_DEG) & (value < FAR_DEG), f"{FITTING_DEG:g}° to {FAR_DEG:g}°", "#E69F00", 0.6),
+        (value >= FAR_DEG, f"{FAR_DEG:g}° and more", "#D55E00", 0.7),
     )
     return [
         {
@@ -102,7 +106,7 @@ def _edges(problem: Problem, positions: Ints, residuals: Floats) -> list[dict[st
             "name": name,
             "x": _lines(positions[problem.edges[drawn[chosen]], 0]),
             "y": _lines(positions[problem.edges[drawn[chosen]], 1]),
-            "line": {"color": color, "width": 0.7},
+            "line": {"color": color, "width": 0.8},
             "opacity": opacity,
             "hoverinfo": "skip",
         }

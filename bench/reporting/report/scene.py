@@ -96,7 +96,7 @@ def _worst_cameras(case: Case, solved: Solved) -> Table:
         component = [int(problem.components[k])] if in_pieces else []
         numbers = (float(solved.errors[k]), float(own[k]), float(at_truth[k]))
         rows.append((int(k), int(problem.degree[k]), *numbers, turned, *component))
-    head = ("Camera", "Edges", "Error °", "Median residual °", "At the truth °", "In a part turned by")
+    head = ("Camera", "Edges", "Error °", "Median residual of its edges °", "At the truth °", "In a part turned by")
     caption = f"Worst cameras of {solved.label}"
     return Table(caption, (*head, "Component") if in_pieces else head, tuple(rows))
 
@@ -106,9 +106,10 @@ def _worst_edges(case: Case, solved: Solved) -> Table:
     order = np.argsort(-np.nan_to_num(solved.residuals, nan=-1), kind="stable")[:WORST]
     rows: list[tuple[Value, ...]] = []
     for k in order:
-        weight = None if solved.edge_weights is None else float(solved.edge_weights[k])
+        weight = [] if solved.edge_weights is None else [float(solved.edge_weights[k])]
         known = [] if outliers is None else ["yes" if outliers[k] else "no"]
         ends = " – ".join(map(str, problem.edges[k]))
-        rows.append((ends, float(solved.residuals[k]), float(case.at_truth[k]), weight, *known))
-    head = ("Edge", "Residual °", "At the truth °", "Weight")
-    return Table(f"Worst edges of {solved.label}", head if outliers is None else (*head, "Outlier"), tuple(rows))
+        rows.append((ends, float(solved.residuals[k]), float(case.at_truth[k]), *weight, *known))
+    weighted = [] if solved.edge_weights is None else ["Weight"]
+    head = ("Edge", "Residual °", "At the truth °", *weighted, *([] if outliers is None else ["Outlier"]))
+    return Table(f"Worst edges of {solved.label}", head, tuple(rows))
