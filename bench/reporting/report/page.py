@@ -93,13 +93,13 @@ def _headline(scenes: Sequence[Scene]) -> list[Scene]:
 
 def _flags(by_scene: Mapping[str, Sequence[Scene]], scenes: Sequence[Scene]) -> list[tuple[bool, str]]:
     """Sentence on each choice that was varied, and whether it matters."""
-    found = []
+    found: list[tuple[bool, str]] = []
     if len(by_scene) > 1 and any(e.scored for s in scenes for e in s.entries):
-        found.append(words.depends("alignment", by_scene, reversals.by_alignment(by_scene)))
+        found += words.depends("alignment", by_scene, reversals.by_alignment(by_scene))
     protocols = list(dict.fromkeys(scene.protocol for scene in scenes))
     if len({(s.dataset, s.instance) for s in scenes}) < len(scenes):
         shared = _under_every(scenes, protocols)
-        found.append(words.depends("protocol", shared, reversals.by_protocol(scenes)))
+        found += words.depends("protocol", shared, reversals.by_protocol(scenes))
     return found
 
 

@@ -139,8 +139,8 @@ def caveats(scenes: Sequence[Scene]) -> list[str]:
     return found
 
 
-def depends(what: str, by_choice: Mapping[str, Sequence[Scene]], found: Sequence[Reversal]) -> tuple[bool, str]:
-    """Whether a choice that was varied matters to who is best or to the order of the methods, and a flag that says so.
+def depends(what: str, by_choice: Mapping[str, Sequence[Scene]], found: Sequence[Reversal]) -> list[tuple[bool, str]]:
+    """Whether a choice that was varied matters, and a sentence on it: to who is best, and to the order of the others.
 
     Parameters
     ----------
@@ -151,20 +151,24 @@ def depends(what: str, by_choice: Mapping[str, Sequence[Scene]], found: Sequence
     found
         Pairs of methods whose order changes.
     """
-    leaders = {choice: _most_often_best(scenes) for choice, scenes in by_choice.items()}
-    sentences = []
-    if len({names for names, _ in leaders.values()}) > 1:
-        scenes = len(_known(next(iter(by_choice.values()))))
+    flags = []
+    choices_of: dict[tuple[tuple[str, ...], int], list[str]] = {}
+    for choice, scenes in by_choice.items():
+        choices_of.setdefault(_most_often_best(scenes), []).append(choice)
+    if len({names for names, _ in choices_of}) > 1:
+        total = len(_known(next(iter(by_choice.values()))))
         parts = [
-            f"under {choice} {enumeration(names)}{f' ({times} of {scenes} scenes)' if scenes > 1 else ''}"
-            for choice, (names, times) in leaders.items()
+            f"under {enumeration(choices)} {enumeration(names)}{f' ({times} of {total} scenes)' if total > 1 else ''}"
+            for (names, times), choices in choices_of.items()
         ]
-        sentences.append(f"Beware: who is best depends on the {what}. Most often among the best: {'; '.join(parts)}.")
+        often = "Most often among the best" if total > 1 else "The best"
+        flags.append((True, f"Who is best depends on the {what}. {often}: {'; '.join(parts)}."))
     if found:
-        sentences.append(_order_depends(what, found, first=not sentences))
-    if not sentences:
-        return False, f"Neither the best methods nor their order depend on the {what} ({enumeration(list(by_choice))})."
-    return True, " ".join(sentences)
+        flags.append((True, _order_depends(what, found)))
+    if not flags:
+        same = f"Neither the best methods nor their order depend on the {what} ({enumeration(list(by_choice))})."
+        flags.append((False, same))
+    return flags
 
 
 def _most_often_best(scenes: Sequence[Scene]) -> tuple[tuple[str, ...], int]:
@@ -174,21 +178,17 @@ def _most_often_best(scenes: Sequence[Scene]) -> tuple[tuple[str, ...], int]:
     return tuple(sorted(label for label, count in times.items() if count == most)), most
 
 
-def _order_depends(what: str, found: Sequence[Reversal], first: bool) -> str:
+def _order_depends(what: str, found: Sequence[Reversal]) -> str:
+    """The clearest pair that changes its order, at the top where there is one there, and how many there are."""
     clearest = max((r for r in found if r.at_the_top == found[0].at_the_top), key=lambda r: _strength(r.medians))
     a, b, c, d = map(degrees, clearest.medians)
     under, other = clearest.choices
-    opening = f"Beware: the order of the methods depends on the {what}. On" if first else "On"
-    where = list(dict.fromkeys(r.scene for r in found))
-    more = (
-        f" In all, {count(len({(r.scene, r.ahead, r.behind) for r in found}), 'pair')} of methods change places, on "
-        f"{enumeration(where)}."
-        if len(found) > 1
-        else ""
-    )
+    pairs = len({(r.scene, r.ahead, r.behind) for r in found})
+    where = enumeration(list(dict.fromkeys(r.scene for r in found)))
+    more = f" In all, {pairs} pairs of methods change places, on {where}." if pairs > 1 else ""
     return (
-        f"{opening} {clearest.scene}, {clearest.ahead} is ahead of {clearest.behind} under {under} "
-        f"({a}° against {b}°) and behind it under {other} ({c}° against {d}°).{more}"
+        f"The order of the methods depends on the {what}: on {clearest.scene}, {clearest.ahead} is ahead of "
+        f"{clearest.behind} under {under} ({a}° against {b}°) and behind it under {other} ({c}° against {d}°).{more}"
     )
 
 
