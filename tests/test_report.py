@@ -207,14 +207,15 @@ class Page(HTMLParser):
             self.data[self.inside] = json.loads(data)
 
 
-class TestHostileNames:
-    @pytest.fixture(scope="class")
-    def page(self, tmp_path_factory):
-        methods = [Made(HOSTILE), Made("fine", 3.0), Made("failed" + HOSTILE, status=f"error({HOSTILE})", log=HOSTILE)]
-        folder = tmp_path_factory.mktemp("hostile") / "run"
-        store = made_run(folder, [HOSTILE, "javascript:alert(4)"], methods, suite=HOSTILE, dataset="toy")
-        return render(store, under_every_rule(store, score(store, checkpoints=True)))
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    methods = [Made(HOSTILE), Made("fine", 3.0), Made("failed" + HOSTILE, status=f"error({HOSTILE})", log=HOSTILE)]
+    folder = tmp_path_factory.mktemp("hostile") / "run"
+    store = made_run(folder, [HOSTILE, "javascript:alert(4)"], methods, suite=HOSTILE, dataset="toy")
+    return render(store, under_every_rule(store, score(store, checkpoints=True)))
 
+
+class TestHostileNames:
     def test_are_text_and_nothing_else(self, page):
         parsed = Page(page)
         clean = Page(re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL))
