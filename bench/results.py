@@ -103,7 +103,7 @@ def score(
     if any("timing" in row for row in collected.rows):
         _compare_times(collected.rows, plans[-1].baseline)
     ties = {
-        place: _tied(by_method, same_cameras=len(collected.instances_of[place]) == 1)
+        place: tied(by_method, same_cameras=len(collected.instances_of[place]) == 1)
         for place, by_method in collected.errors.items()
     }
     errors = {place: {m: tuple(e) for m, e in by_method.items()} for place, by_method in collected.errors.items()}
@@ -218,7 +218,7 @@ def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
     }
 
 
-def _tied(by_method: Mapping[Configured, list[Floats]], same_cameras: bool) -> set[Configured]:
+def tied(by_method: Mapping[Configured, list[Floats]], same_cameras: bool) -> set[Configured]:
     """Ties; on one instance a deterministic method ran once, and would have done the same under every seed."""
     seeds = max(map(len, by_method.values()))
     repeated = {m: errors * (seeds if same_cameras and len(errors) == 1 else 1) for m, errors in by_method.items()}

@@ -19,12 +19,12 @@ def report(
     The file needs no network: open it from disk, send it, print it. The report is about one alignment rule; the
     leaderboard has all of them, and the report says whether the choice changes the ranking.
     """
-    from bench.reporting.report.page import FILE_NAME, rescored, write_report
+    from bench.reporting.report.page import FILE_NAME, write_report
+    from bench.reporting.report.realign import under_every_rule
     from bench.results import score
     from bench.store import Store
 
     folder = run_folder(run)
     store = Store.open(folder)
-    chosen = protocol.value if protocol else None
-    results = score(store, align.value, chosen, checkpoints=True)
-    typer.echo(write_report(store, rescored(store, results, chosen), out or folder / FILE_NAME))
+    results = score(store, align.value, protocol.value if protocol else None, checkpoints=True)
+    typer.echo(write_report(store, under_every_rule(store, results), out or folder / FILE_NAME))

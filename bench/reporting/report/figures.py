@@ -8,8 +8,10 @@ import numpy as np
 import pandas as pd
 
 from bench.problem import Floats
+from bench.reporting.report.embed import compact
 from bench.reporting.report.section import FigureDict
 from bench.reporting.report.standing import geometric_mean
+from bench.reporting.rows import degrees
 from bench.reporting.style import LINES, Look, looks
 from bench.results import Configured
 from bench.scoring.oracle import Curve
@@ -35,8 +37,9 @@ FLOOR_DEG = 1e-3
 FLOOR_S = 1e-4
 SHARES = np.arange(0, 101, 2)  # percentiles of a cumulative curve
 POINTS = 60  # of a curve over iterations
-ERROR_AXIS = {"type": "log", "title": {"text": "error (°)"}, "exponentformat": "none"}
-TIME_AXIS = {"type": "log", "title": {"text": "time to solve (s)"}, "exponentformat": "none"}
+LOG_AXIS = {"type": "log", "minorloglabels": "complete", "exponentformat": "none"}
+SHORT = 0.9  # decades
+WORST = 10.0  # times the best median, from which on colours do not change
 
 
 def looks_by_selection(frame: pd.DataFrame) -> dict[Configured, Look]:
@@ -74,8 +77,10 @@ def against_time(points: Mapping[Configured, tuple[float, float]], look: Looks) 
     traces = [
         {
             "type": "scatter",
-            "mode": "markers",
+            "mode": "markers+text",
             "name": look[key].label,
+            "text": [look[key].label] if (time, error) in best else None,
+            "textposition": "bottom right",
             "x": [time],
             "y": [error],
             "marker": {"symbol": SYMBOLS[look[key].marker], "color": look[key].color, "size": 10},
@@ -83,17 +88,23 @@ def against_time(points: Mapping[Configured, tuple[float, float]], look: Looks) 
         }
         for key, (time, error) in shown.items()
     ]
-    layout = {"xaxis": TIME_AXIS, "yaxis": ERROR_AXIS | {"title": {"text": "median error (°)"}}, "height": 460}
+    layout = {
+        "xaxis": log_axis("time to solve (s)", [time for time, _ in shown.values()]),
+        "yaxis": log_axis("median error (°)", [error for _, error in shown.values()]),
+        "height": 460,
+    }
     return {"data": [frontier, *traces], "layout": layout}
 
 
 def spread(errors: Mapping[Configured, Iterable[Floats]], look: Looks) -> FigureDict:
     """Quartiles, 10th and 90th percentile, median and mean of the errors of each method, a line a method."""
     traces = []
+    drawn: list[float] = []
     for key, style in look.items():
         values = np.maximum(pooled(errors.get(key, ())), FLOOR_DEG)
         if len(values):
             p10, q1, median, q3, p90 = ([float(v)] for v in np.percentile(values, [10, 25, 50, 75, 90]))
+            drawn += [*p10, *p90, float(values.mean())]
             traces.append(
                 {
                     "type": "box",
@@ -111,7 +122,7 @@ def spread(errors: Mapping[Configured, Iterable[Floats]], look: Looks) -> Figure
                 }
             )
     layout = {
-        "xaxis": ERROR_AXIS | {"title": {"text": "error of a camera (°)"}},
+        "xaxis": log_axis("error of a camera (°)", drawn),
         "yaxis": {"autorange": "reversed", "automargin": True, "type": "category"},
         "showlegend": False,
         "height": 130 + 26 * len(traces),
@@ -126,7 +137,8 @@ def cumulative(quantiles: Mapping[Configured, Floats], look: Looks, shown: Itera
     Parameters
     ----------
     quantiles
-        For each configured method, the errors in degrees at `SHARES` percent of the cameras.
+        For each configured method, in the order of the legend, the errors in degrees at `SHARES` percent of the
+        cameras.
     look
         How each is drawn.
     shown
@@ -138,20 +150,18 @@ def cumulative(quantiles: Mapping[Configured, Floats], look: Looks, shown: Itera
             "type": "scatter",
             "mode": "lines",
             "name": style.label,
-            "x": np.maximum(quantiles[key], FLOOR_DEG),
+            "x": compact(np.maximum(quantiles[key], FLOOR_DEG), 3),
             "y0": 0,
             "dy": int(SHARES[1]),
             "visible": None if key in visible else "legendonly",
             "line": {"color": style.color, "dash": dash(style), "width": 1.8},
             "hovertemplate": "%{fullData.name}<br>%{y} % of cameras under %{x:.3g}°<extra></extra>",
         }
-        for key, style in look.items()
-        if key in quantiles
+        for key, style in ((key, look[key]) for key in quantiles)
     ]
-    everything = np.concatenate([quantiles[key] for key in quantiles]) if quantiles else np.ones(1)
-    low = math.log10(max(float(np.percentile(everything, 2)), FLOOR_DEG))
+    everything = np.maximum(np.concatenate([np.ones(0), *quantiles.values()]), FLOOR_DEG)
     layout = {
-        "xaxis": ERROR_AXIS | {"title": {"text": "angle (°)"}, "range": [low, math.log10(180)]},
+        "xaxis": log_axis("angle (°)", np.percentile(everything, [2, 100])),
         "yaxis": {"title": {"text": "cameras under it (%)"}, "range": [0, 101]},
         "height": 460,
     }
@@ -187,7 +197,7 @@ def over_iterations(curves: Mapping[Configured, Sequence[Curve]], look: Looks) -
             )
     layout = {
         "xaxis": {"title": {"text": "iteration"}},
-        "yaxis": ERROR_AXIS | {"title": {"text": "mean error (°)"}},
+        "yaxis": log_axis("mean error (°)", [y for trace in traces for y in trace["y"]]),
         "height": 400,
     }
     return {"data": traces, "layout": layout}
@@ -196,7 +206,7 @@ def over_iterations(curves: Mapping[Configured, Sequence[Curve]], look: Looks) -
 def by_scene(
     scenes: Sequence[str], methods: Sequence[str], medians: Floats, statuses: Sequence[Sequence[str]]
 ) -> FigureDict:
-    """Median error of each method on each scene, as numbers on colours.
+    """Median error of each method on each scene: numbers, on colours for the ratio to the scene's best.
 
     Parameters
     ----------
@@ -208,33 +218,32 @@ def by_scene(
         What is written where there is none.
     """
     written = [
-        [f"{value:.2g}" if math.isfinite(value) else status for value, status in zip(row, why, strict=True)]
+        [degrees(value) if math.isfinite(value) else status for value, status in zip(row, why, strict=True)]
         for row, why in zip(medians.tolist(), statuses, strict=True)
     ]
-    with np.errstate(invalid="ignore"):
-        logs = np.log10(np.maximum(medians, FLOOR_DEG))
-    ticks = [
-        t for t in (0.001, 0.01, 0.1, 0.3, 1, 3, 10, 30, 100) if np.nanmin(logs) <= math.log10(t) <= np.nanmax(logs)
-    ]
+    floored = np.maximum(medians, FLOOR_DEG)  # NaN stays
     trace = {
         "type": "heatmap",
         "x": list(scenes),
         "y": list(methods),
-        "z": logs,
+        "z": np.log(floored / np.nanmin(floored, axis=0)),
+        "zmin": 0,
+        "zmax": math.log(WORST),
+        "customdata": medians,
         "text": written,
         "texttemplate": "%{text}",
-        "colorscale": "Viridis",
-        "reversescale": True,
+        "colorscale": [[0, "#eef5fb"], [1, "#6ea6d8"]],
+        "textfont": {"color": "#16191d"},
+        "showscale": False,
+        "name": "median error (°)",
         "xgap": 2,
         "ygap": 2,
-        "hoverongaps": False,
-        "hovertemplate": "%{y}<br>%{x}: %{text}°<extra></extra>",
-        "colorbar": {"title": {"text": "median °"}, "tickvals": [math.log10(t) for t in ticks], "ticktext": ticks},
+        "hovertemplate": "%{y}<br>%{x}: %{text}<extra></extra>",
     }
     layout = {
-        "xaxis": {"side": "top", "type": "category", "automargin": True, "showgrid": False},
-        "yaxis": {"autorange": "reversed", "type": "category", "automargin": True, "showgrid": False},
-        "height": 170 + 26 * len(methods),
+        "xaxis": {"side": "top", "type": "category", "showgrid": False, "tickangle": -40 if len(scenes) > 8 else 0},
+        "yaxis": {"autorange": "reversed", "type": "category", "showgrid": False},
+        "height": 110 + 26 * len(methods) + 60 * (len(scenes) > 8),
     }
     return {"data": [trace], "layout": layout}
 
@@ -249,6 +258,15 @@ def pooled(errors: Iterable[Floats]) -> Floats:
     """Finite errors of all seeds together."""
     values: Floats = np.concatenate([np.empty(0), *errors])
     return values[np.isfinite(values)]
+
+
+def log_axis(title: str, values: Iterable[float]) -> dict[str, Any]:
+    """A logarithmic axis around the values, with plain numbers at 1, 2 and 5, or at every digit of a short one."""
+    logs = np.log10(list(values) or [1.0])
+    low, high = float(logs.min()), float(logs.max())
+    margin = max(0.06 * (high - low), 0.12)
+    ticks = {"dtick": "D1" if high - low < SHORT else "D2"}
+    return LOG_AXIS | ticks | {"title": {"text": title}, "range": [low - margin, high + margin]}
 
 
 def dash(look: Look) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from bench.problem import Floats
-from bench.reporting.report import figures
+from bench.reporting.report import figures, words
 from bench.reporting.report.section import Section, Table, anchor
 from bench.reporting.report.standing import Standing
 from bench.reporting.rows import Scene, times_note
@@ -15,6 +15,7 @@ from bench.results import Configured, Place, Results
 from bench.store import Store
 
 SHOWN = 8  # curves that are visible at first
+MIDDLE = len(figures.SHARES) // 2  # where a cumulative curve has the median
 
 
 def overall(results: Results, scenes: Sequence[Scene], standings: Sequence[Standing]) -> list[Section]:
@@ -38,16 +39,16 @@ def scene_sections(store: Store, results: Results, place: Place) -> list[Section
     quantiles = {key: q for key, e in errors.items() if (q := figures.quantiles_of(e)) is not None}
     if not quantiles:
         return []
-    look = {key: style for key, style in figures.looks_by_selection(frame).items() if key in quantiles}
-    points = _points(rows, look)
-    first = sorted(quantiles, key=lambda key: float(np.interp(50, figures.SHARES, quantiles[key])))[:SHOWN]
+    quantiles = {key: quantiles[key] for key in sorted(quantiles, key=lambda key: float(quantiles[key][MIDDLE]))}
+    every = figures.looks_by_selection(frame)
+    look = {key: every[key] for key in quantiles}
     name = "-".join(place)
     found = [
         Section(
             anchor("time", name),
             "Error against time",
             (f"Lower left is better; {times_note(rows)}.",),
-            figures.against_time(points, look),
+            figures.against_time(_points(rows, look), look),
         ),
         Section(
             anchor("spread", name),
@@ -59,12 +60,11 @@ def scene_sections(store: Store, results: Results, place: Place) -> list[Section
             anchor("cumulative", name),
             "Cumulative errors",
             (f"Further up and left is better.{_switch_on(len(quantiles))}",),
-            figures.cumulative(quantiles, look, first),
+            figures.cumulative(quantiles, look, list(quantiles)[:SHOWN]),
         ),
     ]
     curves = results.curves.get(place, {})
     if curves:
-        every = figures.looks_by_selection(frame)
         found.append(
             Section(
                 anchor("iterations", name),
@@ -82,7 +82,7 @@ def dependence(by_rule: Mapping[str, Sequence[Scene]]) -> Table:
     for k, scene in enumerate(next(iter(by_rule.values()))):
         best = [", ".join(e.label for e in scenes[k].entries if e.best) or None for scenes in by_rule.values()]
         if any(best):
-            rows.append((scene.instance, *best))
+            rows.append((words.spoken(scene), *best))
     return Table("Best median, and what cannot be told apart from it, by alignment", ("Scene", *by_rule), tuple(rows))
 
 
@@ -111,11 +111,14 @@ def _scene_section(known: Sequence[Scene], standings: Sequence[Standing]) -> Sec
             if entry is not None:
                 medians[row, column] = entry.values["median_deg"].mean
                 statuses[row][column] = entry.failure.split("(")[0]
-    names = [scene.instance.replace("_", " ") for scene in known]
+    names = [words.spoken(scene) for scene in known]
     return Section(
         "error-per-scene",
         "Error per scene",
-        ("Median error in degrees; methods in the order of their mean rank.",),
+        (
+            "Median error in degrees, methods in the order of their mean rank. The darker, the further from the best "
+            f"median on that scene; the darkest is {figures.WORST:g} times it or more.",
+        ),
         figures.by_scene(names, [s.label for s in standings], medians, statuses),
     )
 
@@ -147,8 +150,4 @@ def _points(rows: pd.DataFrame, look: figures.Looks) -> dict[Configured, tuple[f
     ok = rows[(rows["status"] == "ok") & rows["median_deg"].notna() & rows["solve_s"].notna()]
     means = ok.assign(solve_s=pd.to_numeric(ok["solve_s"])).groupby(["method", "params"], sort=False)
     found = means[["solve_s", "median_deg"]].mean()
-    return {
-        (str(method), str(params)): (float(time), float(error))
-        for (method, params), time, error in zip(found.index, found["solve_s"], found["median_deg"], strict=True)
-        if (method, params) in look
-    }
+    return {key: (float(found["solve_s"][key]), float(found["median_deg"][key])) for key in look if key in found.index}

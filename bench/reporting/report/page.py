@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -20,8 +21,7 @@ from bench.reporting.report.section import SceneSections, Section, Table, Value,
 from bench.reporting.report.standing import standings
 from bench.reporting.rows import Scene, is_timed
 from bench.reporting.rows import scenes as scenes_of
-from bench.results import Results, score
-from bench.scoring.alignment import RULES
+from bench.results import Results
 from bench.store import Store
 
 FILE_NAME = "report.html"
@@ -38,12 +38,6 @@ class ScenePage:
     sections: tuple[Section, ...]
 
 
-def rescored(store: Store, results: Results, protocol: str | None = None) -> dict[str, Results]:
-    """The same run under every alignment rule, the rule of `results` first; nothing is run."""
-    others = (rule for rule in RULES if rule != results.alignment)
-    return {results.alignment: results} | {rule: score(store, rule, protocol) for rule in others}
-
-
 def write_report(store: Store, by_rule: Mapping[str, Results], path: Path) -> Path:
     """Write the report of a run to a file.
 
@@ -52,8 +46,8 @@ def write_report(store: Store, by_rule: Mapping[str, Results], path: Path) -> Pa
     store
         The run.
     by_rule
-        The run scored under one or more alignment rules, see `rescored`; the report is about the first, the others
-        are in the leaderboard and tell whether the choice matters.
+        The run scored under one or more alignment rules, see `bench.reporting.report.realign`; the report is about
+        the first, the others are in the leaderboard and tell whether the choice matters.
     path
         The file, replaced where it exists.
     """
@@ -69,16 +63,17 @@ def render(store: Store, by_rule: Mapping[str, Results]) -> str:
     results = next(iter(by_rule.values()))
     by_scene = {rule: scenes_of(r.frame, r.ties) for rule, r in by_rule.items()}
     scenes = by_scene[results.alignment]
-    standing = standings(scenes)
+    headline = _headline(scenes)
+    standing = standings(headline)
     suites = list(dict.fromkeys(plan.suite for plan in store.plans()))
-    sections = overview.overall(results, scenes, standing)
+    sections = overview.overall(results, headline, standing)
     pages = _scene_pages(store, results, scenes)
     data = {"leaderboard": leaderboard(by_scene)} | {
         f"figure-{s.id}": compact(s.figure) for s in [*sections, *(s for p in pages for s in p.sections)] if s.figure
     }
     return _html(
         title=f"{', '.join(suites)}: rotation synchronization",
-        summary=words.summary(scenes, standing, is_timed(results.frame)),
+        summary=words.summary(headline, standing, is_timed(results.frame)),
         flags=_flags(by_scene, scenes),
         dependence=overview.dependence(by_scene) if len(by_scene) > 1 else None,
         sections=sections,
@@ -91,17 +86,29 @@ def render(store: Store, by_rule: Mapping[str, Results]) -> str:
     )
 
 
+def _headline(scenes: Sequence[Scene]) -> list[Scene]:
+    """What the findings are about: one protocol, where a scene was run under several."""
+    several = len({(s.dataset, s.instance) for s in scenes}) < len(scenes)
+    return [s for s in scenes if not several or s.protocol == scenes[0].protocol]
+
+
 def _flags(by_scene: Mapping[str, Sequence[Scene]], scenes: Sequence[Scene]) -> list[tuple[bool, str]]:
     """Sentence on each choice that was varied, and whether it matters."""
-    found = []
+    found: list[tuple[bool, str]] = []
     if len(by_scene) > 1 and any(e.scored for s in scenes for e in s.entries):
-        moved = reversals.by_alignment(by_scene)
-        found.append((bool(moved), words.ranking_depends(moved, "alignment", list(by_scene))))
+        found += words.depends("alignment", by_scene, reversals.by_alignment(by_scene))
     protocols = list(dict.fromkeys(scene.protocol for scene in scenes))
     if len({(s.dataset, s.instance) for s in scenes}) < len(scenes):
-        moved = reversals.by_protocol(scenes)
-        found.append((bool(moved), words.ranking_depends(moved, "protocol", protocols)))
+        shared = _under_every(scenes, protocols)
+        found += words.depends("protocol", shared, reversals.by_protocol(scenes))
     return found
+
+
+def _under_every(scenes: Sequence[Scene], protocols: Sequence[str]) -> dict[str, list[Scene]]:
+    """By protocol, the scenes that were run under each of them."""
+    names = Counter((s.dataset, s.instance) for s in scenes)
+    both = [s for s in scenes if names[s.dataset, s.instance] == len(protocols)]
+    return {protocol: [s for s in both if s.protocol == protocol] for protocol in protocols}
 
 
 def _scene_pages(store: Store, results: Results, scenes: Sequence[Scene]) -> list[ScenePage]:
@@ -112,7 +119,7 @@ def _scene_pages(store: Store, results: Results, scenes: Sequence[Scene]) -> lis
     for scene in scenes:
         place = (scene.dataset, scene.instance, scene.protocol)
         sections = [s for part in SCENE_PARTS for s in part(store, results, place)]
-        title = f"{f'{scene.dataset} / ' if several else ''}{scene.instance.replace('_', ' ')}"
+        title = f"{f'{scene.dataset} / ' if several else ''}{words.spoken(scene)}"
         pages.append(
             ScenePage(
                 _unique(anchor("scene", *place), used),

@@ -69,7 +69,9 @@ def reversals(left: Scene, right: Scene, choices: tuple[str, str]) -> list[Rever
         medians = _median(ahead[0]), _median(behind[0]), _median(ahead[1]), _median(behind[1])
         if medians[1] > MARGIN * medians[0] and medians[2] > MARGIN * medians[3]:
             top = ahead[0].best and not behind[0].best and behind[1].best and not ahead[1].best
-            found.append(Reversal(left.instance, choices, ahead[0].label, behind[0].label, medians, top))
+            found.append(
+                Reversal(left.instance.replace("_", " "), choices, ahead[0].label, behind[0].label, medians, top)
+            )
     return found
 
 

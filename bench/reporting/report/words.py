@@ -6,7 +6,7 @@ that were scored, on every one of which both methods ended well. Pure functions.
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from bench.reporting.report.reversals import Reversal
 from bench.reporting.report.standing import Standing, geometric_mean
@@ -46,16 +46,17 @@ def who_is_best(scenes: Sequence[Scene], standings: Sequence[Standing]) -> list[
     known = _known(scenes)
     if not known:
         return ["No scene has ground truth that a method could be scored against: errors are unknown."]
-    where = f"On these {len(known)} scenes" if len(known) > 1 else f"On {known[0].instance}"
+    where = f"On these {len(known)} scenes" if len(known) > 1 else f"On {spoken(known[0])}"
     always = [s for s in standings if len(s.best_on) == len(known)]
     if len(always) > 1:
         names = enumeration([s.label for s in always])
         return [f"{where}, {names} are tied for the best median error: they cannot be told apart from the best."]
     if always:
-        return [
-            f"{where}, {always[0].label} has the best median error; every other method can be told apart from it"
-            f"{' on at least one' if len(known) > 1 else ''}."
-        ]
+        alone = [spoken(s) for s in known if [e.label for e in s.entries if e.best] == [always[0].label]]
+        if len(alone) == len(known):
+            return [f"{where}, {always[0].label} has the best median error, and no other is tied with it."]
+        shared = f"alone on {enumeration(alone)}, tied with others elsewhere" if alone else "tied with others on each"
+        return [f"{where}, only {always[0].label} is among the best everywhere: {shared}."]
     leading = sorted((s for s in standings if s.best_on), key=lambda s: -len(s.best_on))
     if not leading:
         return [f"{where}, no method ended well."]
@@ -127,7 +128,7 @@ def what_failed(scenes: Sequence[Scene]) -> str:
 def caveats(scenes: Sequence[Scene]) -> list[str]:
     """What the reader must not conclude."""
     found = []
-    blind = [s.instance for s in scenes if not any(e.scored for e in s.entries)]
+    blind = [spoken(s) for s in scenes if not any(e.scored for e in s.entries)]
     if blind and len(blind) < len(scenes):
         found.append(f"Not scored, for want of ground truth or of a result: {enumeration(blind)}.")
     if scenes and max(e.seeds for s in scenes for e in s.entries) == 1 and _known(scenes):
@@ -138,24 +139,56 @@ def caveats(scenes: Sequence[Scene]) -> list[str]:
     return found
 
 
-def ranking_depends(found: Sequence[Reversal], what: str, choices: Sequence[str]) -> str:
-    """One flag: whether the order of methods changes with the alignment or the protocol, with the clearest case."""
-    if not found:
-        return f"The order of the methods does not depend on the {what} ({enumeration(list(choices))})."
-    first = max((r for r in found if r.at_the_top == found[0].at_the_top), key=lambda r: _strength(r.medians))
-    a, b, c, d = map(degrees, first.medians)
-    under, other = first.choices
-    top = "who is best depends" if first.at_the_top else "the order of the methods depends"
-    where = list(dict.fromkeys(r.scene for r in found))
-    more = (
-        f" In all, {count(len({(r.scene, r.ahead, r.behind) for r in found}), 'pair')} of methods on "
-        f"{count(len(where), 'scene')} ({enumeration(where)})."
-        if len(found) > 1
-        else ""
-    )
+def depends(what: str, by_choice: Mapping[str, Sequence[Scene]], found: Sequence[Reversal]) -> list[tuple[bool, str]]:
+    """Whether a choice that was varied matters, and a sentence on it: to who is best, and to the order of the others.
+
+    Parameters
+    ----------
+    what
+        "alignment" or "protocol".
+    by_choice
+        The same scenes under each choice.
+    found
+        Pairs of methods whose order changes.
+    """
+    flags = []
+    choices_of: dict[tuple[tuple[str, ...], int], list[str]] = {}
+    for choice, scenes in by_choice.items():
+        choices_of.setdefault(_most_often_best(scenes), []).append(choice)
+    if len({names for names, _ in choices_of}) > 1:
+        total = len(_known(next(iter(by_choice.values()))))
+        parts = [
+            f"under {enumeration(choices)} {enumeration(names)}{f' ({times} of {total} scenes)' if total > 1 else ''}"
+            for (names, times), choices in choices_of.items()
+        ]
+        often = "Most often among the best" if total > 1 else "The best"
+        flags.append((True, f"Who is best depends on the {what}. {often}: {'; '.join(parts)}."))
+    if found:
+        flags.append((True, _order_depends(what, found)))
+    if not flags:
+        same = f"Neither the best methods nor their order depend on the {what} ({enumeration(list(by_choice))})."
+        flags.append((False, same))
+    return flags
+
+
+def _most_often_best(scenes: Sequence[Scene]) -> tuple[tuple[str, ...], int]:
+    """The methods that are among the best on most scenes, and on how many."""
+    times = Counter(e.label for s in scenes for e in s.entries if e.best)
+    most = max(times.values(), default=0)
+    return tuple(sorted(label for label, count in times.items() if count == most)), most
+
+
+def _order_depends(what: str, found: Sequence[Reversal]) -> str:
+    """The clearest pair that changes its order, at the top where there is one there, and how many there are."""
+    clearest = max((r for r in found if r.at_the_top == found[0].at_the_top), key=lambda r: _strength(r.medians))
+    a, b, c, d = map(degrees, clearest.medians)
+    under, other = clearest.choices
+    pairs = len({(r.scene, r.ahead, r.behind) for r in found})
+    where = enumeration(list(dict.fromkeys(r.scene for r in found)))
+    more = f" In all, {pairs} pairs of methods change places, on {where}." if pairs > 1 else ""
     return (
-        f"Beware: {top} on the {what}. On {first.scene}, {first.ahead} is ahead of {first.behind} under {under} "
-        f"({a}° against {b}°) and behind it under {other} ({c}° against {d}°).{more}"
+        f"The order of the methods depends on the {what}: on {clearest.scene}, {clearest.ahead} is ahead of "
+        f"{clearest.behind} under {under} ({a}° against {b}°) and behind it under {other} ({c}° against {d}°).{more}"
     )
 
 
@@ -170,6 +203,11 @@ def enumeration(names: Sequence[str]) -> str:
     if len(names) > NAMED + 1:
         names = [*names[:NAMED], f"{len(names) - NAMED} more"]
     return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+
+
+def spoken(scene: Scene) -> str:
+    """Name of a scene in prose."""
+    return scene.instance.replace("_", " ")
 
 
 def kind_of(status: str) -> str:

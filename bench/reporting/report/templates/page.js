@@ -74,6 +74,7 @@
   const tells = (column) => {
     const values = new Set(shown.map((row) => get(row, column.key)));
     if (["scene", "protocol", "alignment"].includes(column.key)) return values.size > 1;
+    if (column.key === "outcome") return values.size > 1 || !values.has("ok");
     return column.key === "method" || [...values].some((value) => value !== null);
   };
   const element = (name, text, properties = {}) => Object.assign(document.createElement(name), { textContent: text }, properties);
@@ -141,6 +142,11 @@
       hoverlabel: { bgcolor: colors.paper, bordercolor: colors.rule, font: { color: colors.ink } },
       dragmode: small ? false : "zoom",
     } };
+    if (small) {
+      delete layout.xaxis?.dtick;
+      if (layout.xaxis?.side === "top") layout.xaxis.tickangle = -60;
+      for (const trace of traces) if (trace.mode === "markers+text") trace.mode = "markers";
+    }
     const height = (layout.height ?? 420) + (small && layout.showlegend !== false && named > 1 ? 13 * named : 0);
     return { traces, layout: { ...layout, template, width, height } };
   };
@@ -181,7 +187,7 @@
     const records = [];
     for (const trace of traces) {
       if (Array.isArray(trace.z)) {
-        const value = trace.colorbar?.title?.text ?? "z";
+        const value = decoded(trace.name ?? trace.colorbar?.title?.text ?? "z");
         const z = trace.customdata ?? trace.z;
         z.forEach((line, i) => line.forEach((v, j) => records.push({ [names.y]: trace.y?.[i] ?? i, [names.x]: trace.x?.[j] ?? j, [value]: v, text: trace.text?.[i]?.[j] })));
         continue;
@@ -216,7 +222,7 @@
   // ---- theme, links, paper
 
   const toggle = document.getElementById("theme");
-  const mark = () => toggle.setAttribute("aria-pressed", String(root.dataset.theme === "dark"));
+  const mark = () => { toggle.textContent = root.dataset.theme === "dark" ? "Light" : "Dark"; };
   toggle.addEventListener("click", () => {
     root.dataset.theme = root.dataset.theme === "dark" ? "light" : "dark";
     try { localStorage.setItem("theme", root.dataset.theme); } catch { /* the choice lasts as long as the page */ }
