@@ -74,7 +74,7 @@ def render(store: Store, by_rule: Mapping[str, Results]) -> str:
     return _html(
         title=f"{', '.join(suites)}: rotation synchronization",
         summary=words.summary(headline, standing, is_timed(results.frame)),
-        flags=_flags(by_scene, scenes),
+        flags=_flags(by_rule, by_scene, scenes),
         dependence=overview.dependence(by_scene) if len(by_scene) > 1 else None,
         sections=sections,
         scenes=pages,
@@ -92,15 +92,18 @@ def _headline(scenes: Sequence[Scene]) -> list[Scene]:
     return [s for s in scenes if not several or s.protocol == scenes[0].protocol]
 
 
-def _flags(by_scene: Mapping[str, Sequence[Scene]], scenes: Sequence[Scene]) -> list[tuple[bool, str]]:
+def _flags(
+    by_rule: Mapping[str, Results], by_scene: Mapping[str, Sequence[Scene]], scenes: Sequence[Scene]
+) -> list[tuple[bool, str]]:
     """Sentence on each choice that was varied, and whether it matters."""
     found: list[tuple[bool, str]] = []
+    better = {rule: reversals.better_pairs(results) for rule, results in by_rule.items()}
     if len(by_scene) > 1 and any(e.scored for s in scenes for e in s.entries):
-        found += words.depends("alignment", by_scene, reversals.by_alignment(by_scene))
+        found += words.depends("alignment", by_scene, reversals.by_alignment(by_scene, better))
     protocols = list(dict.fromkeys(scene.protocol for scene in scenes))
     if len({(s.dataset, s.instance) for s in scenes}) < len(scenes):
         shared = _under_every(scenes, protocols)
-        found += words.depends("protocol", shared, reversals.by_protocol(scenes))
+        found += words.depends("protocol", shared, reversals.by_protocol(scenes, next(iter(better.values()))))
     return found
 
 
