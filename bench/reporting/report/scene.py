@@ -19,9 +19,11 @@ WORST = 8  # cameras and edges that are listed
 def sections(store: Store, results: Results, place: Place) -> list[Section]:
     """Everything that can be said of a scene beyond its scores; empty where nothing ended well."""
     case = gather(store, results, place)
-    if case is None:
-        return []
-    looks = figures.looks_by_selection(results.frame)
+    return [] if case is None else sections_of(case, figures.looks_by_selection(results.frame))
+
+
+def sections_of(case: Case, looks: figures.Looks) -> list[Section]:
+    """The same of what is known of it."""
     found = [*fold_section(case), *_graph_sections(case), *cycle_section(case)]
     return [*found, *roc_section(case, looks), *cost_section(case)]
 
