@@ -185,7 +185,7 @@ class TestGraph:
         solved = case_of(problem, truth, rotations).solved[0]
         errors = np.degrees(so3.angle_between(rotations, truth))
         drawn = compact(graph.figure(problem, graph.layout(problem), solved, errors, "error"))
-        assert len(json.dumps(drawn, separators=(",", ":"))) < 32_000
+        assert len(json.dumps(drawn, separators=(",", ":"))) < 25_000
         layers = [trace for trace in drawn["data"] if trace["mode"] == "lines"]
         assert sum(trace["x"].count(None) for trace in layers) == graph.EDGES
         assert layers[-1]["name"] == "15° and more"

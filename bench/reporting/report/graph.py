@@ -14,7 +14,7 @@ from bench.reporting.report.section import FigureDict
 from bench.scoring.folds import Fold
 
 GRID = 1000
-EDGES = 500  # drawn of each figure
+EDGES = 300  # drawn of each figure
 WORK = 2e8  # pairs of cameras of all iterations together, from which on there are fewer iterations
 NEARER = 0.6  # exponent of the distance from the middle: a few cameras far out leave room for the others
 START = 10  # cameras; below, the layout starts at random

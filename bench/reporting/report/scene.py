@@ -12,7 +12,7 @@ from bench.results import Place, Results
 from bench.store import Store
 
 MOST_CAMERAS = 6000  # of a graph that is drawn
-BOTH = 600  # cameras up to which the worst estimate is drawn beside the best
+BOTH = 400  # cameras up to which the worst estimate is drawn beside the best
 WORST = 8  # cameras and edges that are listed
 
 
@@ -53,10 +53,11 @@ def _graph_words(case: Case) -> tuple[str, ...]:
     problem = case.instance.problem
     edges = f"a random {graph.EDGES} of the {problem.m} edges" if problem.m > graph.EDGES else "all edges"
     color = "error" if case.has_truth else "the median residual of its edges, as there is no ground truth"
+    rings = " Rings mark cameras that share one wrong rotation." if any(s.folds for s in case.solved) else ""
     seeds = " The first seed is shown." if case.several else ""
     return (
         f"A dot is a camera, coloured by {color}; what is joined by many edges is drawn together. Shown are {edges}, "
-        f"coloured by residual at the estimate. Rings mark cameras that share one wrong rotation.{seeds}",
+        f"coloured by residual at the estimate.{rings}{seeds}",
     )
 
 
@@ -111,7 +112,9 @@ def _worst_edges(case: Case, solved: Solved) -> Table:
         weight = [] if solved.edge_weights is None else [float(solved.edge_weights[k])]
         known = [] if outliers is None else ["yes" if outliers[k] else "no"]
         ends = " – ".join(map(str, problem.edges[k]))
-        rows.append((ends, float(solved.residuals[k]), float(case.at_truth[k]), *weight, *known))
+        at_truth = [float(case.at_truth[k])] if case.has_truth else []
+        rows.append((ends, float(solved.residuals[k]), *at_truth, *weight, *known))
     weighted = [] if solved.edge_weights is None else ["Weight"]
-    head = ("Edge", "Residual °", "At the truth °", *weighted, *([] if outliers is None else ["Outlier"]))
+    truth = ["At the truth °"] if case.has_truth else []
+    head = ("Edge", "Residual °", *truth, *weighted, *([] if outliers is None else ["Outlier"]))
     return Table(f"Worst edges of {solved.label}", head, tuple(rows))
