@@ -66,7 +66,6 @@ def against_time(points: Mapping[Configured, tuple[float, float]], look: Looks) 
         if not best or error < best[-1][1]:
             best.append((time, error))
     frontier = {
-        "type": "scatter",
         "mode": "lines",
         "name": "Pareto frontier",
         "x": [time for time, _ in best],
@@ -76,22 +75,22 @@ def against_time(points: Mapping[Configured, tuple[float, float]], look: Looks) 
     }
     traces = [
         {
-            "type": "scatter",
             "mode": "markers+text",
             "name": look[key].label,
             "text": [look[key].label] if (time, error) in best else None,
-            "textposition": "bottom right",
             "x": [time],
             "y": [error],
-            "marker": {"symbol": SYMBOLS[look[key].marker], "color": look[key].color, "size": 10},
-            "hovertemplate": "%{fullData.name}<br>%{y:.3g}° in %{x:.3g} s<extra></extra>",
+            "marker": {"symbol": SYMBOLS[look[key].marker], "color": look[key].color},
         }
         for key, (time, error) in shown.items()
     ]
     layout = {
         "xaxis": log_axis("time to solve (s)", [time for time, _ in shown.values()]),
         "yaxis": log_axis("median error (°)", [error for _, error in shown.values()]),
-        "height": 460,
+        "height": tall(len(traces) + 1),
+        "template": every_scatter(
+            "%{fullData.name}<br>%{y:.3g}° in %{x:.3g} s", textposition="bottom right", marker={"size": 10}
+        ),
     }
     return {"data": [frontier, *traces], "layout": layout}
 
@@ -147,15 +146,10 @@ def cumulative(quantiles: Mapping[Configured, Floats], look: Looks, shown: Itera
     visible = set(shown)
     traces = [
         {
-            "type": "scatter",
-            "mode": "lines",
             "name": style.label,
             "x": compact(np.maximum(quantiles[key], FLOOR_DEG), 3),
-            "y0": 0,
-            "dy": int(SHARES[1]),
             "visible": None if key in visible else "legendonly",
-            "line": {"color": style.color, "dash": dash(style), "width": 1.8},
-            "hovertemplate": "%{fullData.name}<br>%{y} % of cameras under %{x:.3g}°<extra></extra>",
+            "line": {"color": style.color, "dash": dash(style)},
         }
         for key, style in ((key, look[key]) for key in quantiles)
     ]
@@ -163,7 +157,10 @@ def cumulative(quantiles: Mapping[Configured, Floats], look: Looks, shown: Itera
     layout = {
         "xaxis": log_axis("angle (°)", np.percentile(everything, [2, 100])),
         "yaxis": {"title": {"text": "cameras under it (%)"}, "range": [0, 101]},
-        "height": 460,
+        "height": tall(len(traces)),
+        "template": every_scatter(
+            "%{fullData.name}<br>%{y} % of cameras under %{x:.3g}°", mode="lines", y0=0, dy=int(SHARES[1])
+        ),
     }
     return {"data": traces, "layout": layout}
 
@@ -182,23 +179,24 @@ def over_iterations(curves: Mapping[Configured, Sequence[Curve]], look: Looks) -
             kept = np.unique(np.linspace(0, len(curve.iterations) - 1, POINTS).astype(int))
             traces.append(
                 {
-                    "type": "scatter",
-                    "mode": "lines+markers",
                     "name": look[key].label,
                     "legendgroup": look[key].label,
                     "showlegend": k == 0,
                     "x": curve.iterations[kept],
                     "y": np.maximum(curve.mean_deg[kept], FLOOR_DEG),
                     "customdata": curve.seconds[kept],
-                    "line": {"color": look[key].color, "dash": dash(look[key]), "width": 1.5},
-                    "marker": {"size": 4},
-                    "hovertemplate": "%{fullData.name}<br>%{y:.3g}° at %{x}, %{customdata:.3g} s<extra></extra>",
+                    "line": {"color": look[key].color, "dash": dash(look[key])},
                 }
             )
     layout = {
         "xaxis": {"title": {"text": "iteration"}},
         "yaxis": log_axis("mean error (°)", [y for trace in traces for y in trace["y"]]),
-        "height": 400,
+        "height": tall(len(curves)),
+        "template": every_scatter(
+            "%{fullData.name}<br>%{y:.3g}° at iteration %{x}, after %{customdata:.3g} s",
+            mode="lines+markers",
+            marker={"size": 4},
+        ),
     }
     return {"data": traces, "layout": layout}
 
@@ -243,7 +241,9 @@ def by_scene(
     layout = {
         "xaxis": {"side": "top", "type": "category", "showgrid": False, "tickangle": -40 if len(scenes) > 8 else 0},
         "yaxis": {"autorange": "reversed", "type": "category", "showgrid": False},
+        "plot_bgcolor": "#e4e7ea",
         "height": 110 + 26 * len(methods) + 60 * (len(scenes) > 8),
+        "meta": {"width": 200 + 42 * len(scenes)},
     }
     return {"data": [trace], "layout": layout}
 
@@ -258,6 +258,16 @@ def pooled(errors: Iterable[Floats]) -> Floats:
     """Finite errors of all seeds together."""
     values: Floats = np.concatenate([np.empty(0), *errors])
     return values[np.isfinite(values)]
+
+
+def tall(entries: int) -> int:
+    """Height at which a legend of so many entries needs no scrolling."""
+    return max(440, 70 + 19 * entries)
+
+
+def every_scatter(hover: str, **more: Any) -> dict[str, Any]:
+    """A plotly template: what the traces of a figure share is written once. The hover text must hold no names."""
+    return {"data": {"scatter": [{"hovertemplate": f"{hover}<extra></extra>", "line": {"width": 1.8}, **more}]}}
 
 
 def log_axis(title: str, values: Iterable[float]) -> dict[str, Any]:

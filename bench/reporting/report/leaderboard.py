@@ -1,5 +1,6 @@
 """The rows of the leaderboard: every method on every scene and over all scenes, under every alignment rule."""
 
+import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -44,12 +45,19 @@ COLUMNS = (
 
 
 def leaderboard(by_rule: Mapping[str, Sequence[Scene]]) -> dict[str, Any]:
-    """Columns and rows as the page reads them; a column that no row has a value in is left out."""
+    """Columns and rows as the page reads them; a column that no row has a value in is left out.
+
+    Texts are written once: a column of kind text has its ``values``, and the rows hold their numbers in it.
+    """
     rows = [row for scenes in by_rule.values() for row in _rows(scenes)]
     columns = [c for c in COLUMNS if any(row.get(c.key) is not None for row in rows)]
+    texts = {c.key: list(dict.fromkeys(row.get(c.key) for row in rows)) for c in columns if c.kind == "text"}
+    number = {key: {value: k for k, value in enumerate(values)} for key, values in texts.items()}
     return {
-        "columns": [{"key": c.key, "head": c.head, "kind": c.kind, "meaning": c.meaning} for c in columns],
-        "rows": [[row.get(c.key) for c in columns] for row in rows],
+        "columns": [dataclasses.asdict(c) | {"values": texts.get(c.key)} for c in columns],
+        "rows": [
+            [number[c.key][row.get(c.key)] if c.key in number else row.get(c.key) for c in columns] for row in rows
+        ],
         "best": [k for k, row in enumerate(rows) if row["best"]],
         "all": ALL_SCENES,
     }

@@ -23,7 +23,8 @@
 
   const board = data("leaderboard");
   const best = new Set(board.best);
-  const rows = board.rows.map((values, k) => ({ values, best: best.has(k) }));
+  const decode = (value, k) => board.columns[k].values?.[value] ?? (board.columns[k].values ? null : value);
+  const rows = board.rows.map((values, k) => ({ values: values.map(decode), best: best.has(k) }));
   const at = Object.fromEntries(board.columns.map((column, k) => [column.key, k]));
   const get = (row, key) => (key in at ? row.values[at[key]] : null);
   const digits = (value, three) => (value >= 100 ? value.toFixed(0) : value.toFixed(value >= 10 ? three - 2 : value >= 1 ? three - 1 : three));
@@ -133,7 +134,7 @@
     const axis = { gridcolor: colors.rule, zerolinecolor: colors.rule, linecolor: colors.rule, automargin: true };
     const small = width < 640;
     const named = traces.filter((trace) => trace.name && trace.showlegend !== false).length;
-    const template = { layout: {
+    const template = { data: layout.template?.data, layout: {
       font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colors.ink },
       paper_bgcolor: background, plot_bgcolor: background,
       margin: { l: 60, r: 12, t: 16, b: 52 },
@@ -147,14 +148,15 @@
       if (layout.xaxis?.side === "top") layout.xaxis.tickangle = -60;
       for (const trace of traces) if (trace.mode === "markers+text") trace.mode = "markers";
     }
-    const height = (layout.height ?? 420) + (small && layout.showlegend !== false && named > 1 ? 13 * named : 0);
-    return { traces, layout: { ...layout, template, width, height } };
+    const height = (layout.height ?? 420) + (small && layout.showlegend !== false && named > 1 ? 19 * named : 0);
+    return { traces, layout: { ...layout, template, width: Math.max(width, layout.meta?.width ?? 0), height } };
   };
   const show = (figure) => {
     const target = plot(figure);
     const { traces, layout } = styled(figure.dataset.figure, palette(), "rgba(0,0,0,0)", target.clientWidth);
     if (figure.dataset.all) for (const trace of traces) delete trace.visible;
     target.style.height = `${layout.height}px`;
+    target.tabIndex = layout.width > target.clientWidth ? 0 : -1;
     Plotly.react(target, traces, layout, { displayModeBar: false });
     const curves = figure.querySelector('[data-action="curves"]');
     curves.hidden = !figure.dataset.all && !traces.some((trace) => trace.visible === "legendonly");
@@ -178,11 +180,12 @@
 
   const svg = (id) => {
     const { traces, layout } = styled(id, LIGHT, LIGHT.paper, 900);
-    return Plotly.downloadImage({ data: traces, layout }, { format: "svg", filename: id, width: 900, height: layout.height });
+    return Plotly.downloadImage({ data: traces, layout }, { format: "svg", filename: id, width: layout.width, height: layout.height });
   };
   const decoded = (value) => (typeof value === "string" ? value.replaceAll("&lt;", "<").replaceAll("&amp;", "&") : value);
   const longTable = ({ data: traces, layout }) => {
     const title = (axis) => layout[axis]?.title?.text;
+    const shared = layout.template?.data?.scatter?.[0] ?? {};
     const names = { x: title("xaxis") ?? "x", y: title("yaxis") ?? "y" };
     const records = [];
     for (const trace of traces) {
@@ -197,7 +200,7 @@
       const length = Math.max(0, ...arrays.map(([, values]) => values.length));
       for (let i = 0; i < length; i++) {
         const record = { series: trace.name };
-        if (trace.dy && !trace.y) record[names.y] = (trace.y0 ?? 0) + i * trace.dy;
+        if (shared.dy && !trace.y) record[names.y] = shared.y0 + i * shared.dy;
         for (const [key, values] of arrays) record[names[key] ?? key] = values[i];
         records.push(record);
       }
