@@ -12,7 +12,7 @@ from bench.results import Place, Results
 from bench.store import Store
 
 MOST_CAMERAS = 6000  # of a graph that is drawn
-BOTH = 400  # cameras up to which the worst estimate is drawn beside the best
+BOTH = 300  # cameras up to which the worst estimate is drawn beside the best
 WORST = 8  # cameras and edges that are listed
 
 
