@@ -11,6 +11,7 @@ import pytest
 from bench.reporting.report.page import write_report
 from bench.reporting.report.realign import under_every_rule
 from bench.results import score
+from tests.commands import bench
 from tests.runs import Made, made_run
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -209,9 +210,8 @@ def test_curves_that_are_hidden_at_first_can_be_shown(visit):
     assert lines.count() > few == 8
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1280, 390])
-def test_accessibility_and_width(browser, report, scheme, width):
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
+def test_accessibility_and_width(browser, report, width, scheme):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
     visit = Visit(browser, report, color_scheme=scheme, viewport={"width": width, "height": 800})
     visit.draw_everything()
@@ -245,4 +245,19 @@ def test_prints_in_light_colours_with_its_figures(browser, report):
     assert visit.page.locator("#figures .main-svg").count() > 0
     assert visit.page.evaluate("document.documentElement.dataset.theme") == "dark"
     assert visit.complaints == []
+    visit.context.close()
+
+
+@pytest.mark.real_data
+def test_the_report_that_a_run_on_the_real_scenes_ends_with(browser, real_data, tmp_path):
+    out = tmp_path / "run"
+    methods = ("-m", "l1-irls", "-m", "spanning-tree", "-m", "dmf-synch[loss=l1]")
+    done = bench("run", "--suite", "1dsfm", "--data-dir", real_data / "1dsfm", *methods, "--out", out)
+    assert f"report: {out / 'report.html'}" in done.stdout
+    visit = Visit(browser, out / "report.html")
+    visit.draw_everything()
+    assert "On these 4 scenes" in visit.page.locator(".findings").inner_text()
+    assert set(visit.column("Method")) >= {"l1-irls", "spanning-tree"}
+    assert visit.complaints == []
+    assert visit.left == []
     visit.context.close()

@@ -243,6 +243,7 @@ def by_scene(
         "yaxis": {"autorange": "reversed", "type": "category", "showgrid": False},
         "plot_bgcolor": "#e4e7ea",
         "height": 110 + 26 * len(methods) + 60 * (len(scenes) > 8),
+        "margin": {"r": 60} if len(scenes) > 8 else None,
         "meta": {"width": 200 + 42 * len(scenes)},
     }
     return {"data": [trace], "layout": layout}

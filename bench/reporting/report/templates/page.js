@@ -143,10 +143,12 @@
       hoverlabel: { bgcolor: colors.paper, bordercolor: colors.rule, font: { color: colors.ink } },
       dragmode: small ? false : "zoom",
     } };
-    if (small) {
-      delete layout.xaxis?.dtick;
-      if (layout.xaxis?.side === "top") layout.xaxis.tickangle = -60;
-      for (const trace of traces) if (trace.mode === "markers+text") trace.mode = "markers";
+    const decade = width / (layout.xaxis?.range?.[1] - layout.xaxis?.range?.[0]);
+    if (decade < 200) delete layout.xaxis.dtick; // three labels in each would touch
+    if (width < 800) for (const trace of traces) if (trace.mode === "markers+text") trace.mode = "markers";
+    if (small && layout.xaxis?.side === "top") {
+      layout.xaxis.tickangle = -60;
+      template.layout.margin.r = 70;
     }
     const height = (layout.height ?? 420) + (small && layout.showlegend !== false && named > 1 ? 19 * named : 0);
     return { traces, layout: { ...layout, template, width: Math.max(width, layout.meta?.width ?? 0), height } };
