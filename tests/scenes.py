@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from bench import so3
-from bench.problem import Floats, Instance
+from bench.problem import Floats, Instance, Ints
 from bench.registry import Dataset, Source
 
 UNREGISTERED = "1 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
@@ -53,3 +53,17 @@ def load(dataset: Dataset, data_dir: Path | None = None, seed: int = 0) -> Insta
     instance = source.load()
     assert (instance.name, instance.revision) == (source.name, source.revision)
     return instance
+
+
+def part_of(instance: Instance) -> Ints:
+    """Cameras of the turned part of a folded scene, told from the edges across, which are its only outliers.
+
+    R_i^T R_ij R_j is F where i is in the part and its inverse where j is, up to noise; the part is the smaller side.
+    """
+    assert instance.truth is not None
+    assert instance.outliers is not None
+    i, j = instance.problem.edges[instance.outliers].T
+    turned = np.swapaxes(instance.truth[i], 1, 2) @ instance.problem.rotations[instance.outliers] @ instance.truth[j]
+    first = so3.log(turned) @ so3.log(turned[0]) > 0
+    sides = np.where(first, i, j), np.where(first, j, i)
+    return np.asarray(min(map(np.unique, sides), key=len))

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import trapezoid
 
 from bench.reporting import tables
 from bench.reporting.rows import area
 from bench.results import Results, score
 from bench.runner import Options, Run
-from bench.scoring.roc import roc_auc
+from bench.scoring.roc import roc_auc, roc_curve
 
 
 def test_is_the_share_of_pairs_in_the_right_order() -> None:
@@ -36,6 +37,19 @@ def test_infinite_and_equal_weights() -> None:
 @pytest.mark.parametrize("outliers", [[True, True], [False, False]])
 def test_one_kind_alone_has_no_curve(outliers: list[bool]) -> None:
     assert np.isnan(roc_auc(np.array([1.0, 2.0]), np.array(outliers)))
+
+
+@pytest.mark.parametrize("levels", [6, 10**6])
+def test_the_area_is_that_under_the_curve(levels: int) -> None:
+    rng = np.random.default_rng(1)
+    weights, outliers = rng.integers(0, levels, 500).astype(float), rng.random(500) < 0.4
+    weights[~outliers] += levels / 4
+    weights[:20] = np.nan
+    lost, caught = roc_curve(weights, outliers, points=1000)
+    assert trapezoid(caught, lost) == pytest.approx(roc_auc(weights, outliers), abs=1e-12)
+    assert (lost[0], caught[0], lost[-1], caught[-1]) == (0, 0, 1, 1)
+    assert len(roc_curve(weights, outliers, points=50)[0]) <= 51
+    assert len(roc_curve(weights, np.ones(500, dtype=bool))[0]) == 0
 
 
 @pytest.fixture(scope="module")

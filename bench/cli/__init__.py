@@ -20,6 +20,7 @@ from bench.cli import (
     new,
     paper,
     plot,
+    report,
     rerun,
     run,
     solve,
@@ -41,6 +42,7 @@ app.command("list")(list_.list_)
 app.command("table")(table.table)
 app.command("plot")(plot.plot)
 app.command("compare")(compare.compare)
+app.command("report")(report.report)
 app.command("paper")(paper.paper)
 app.command("merge")(merge.merge)
 app.command("doctor")(doctor.doctor)

@@ -133,6 +133,8 @@ def _present(planned: "Run", align: Align) -> None:
     import shutil
 
     from bench.reporting.present import render_table, write_plots, write_tables
+    from bench.reporting.report.page import FILE_NAME, write_report
+    from bench.reporting.report.realign import under_every_rule
     from bench.results import score
 
     wear()
@@ -145,4 +147,6 @@ def _present(planned: "Run", align: Align) -> None:
     plots = write_plots(results, folder / "plots")
     typer.echo(f"tables: {folder / 'tables'} (console, Markdown, CSV, LaTeX)")
     typer.echo(f"plots:  {folder / 'plots'} (PNG, PDF, SVG)" if plots else "plots:  none, nothing was scored")
+    report = write_report(planned.store, under_every_rule(planned.store, results), folder / FILE_NAME)
+    typer.echo(f"report: {report} (one HTML file, no network)")
     typer.echo(f"again:  python -m bench table {folder} --align chordal --format latex")

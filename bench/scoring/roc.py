@@ -33,3 +33,30 @@ def roc_auc(weights: Floats, outliers: NDArray[np.bool_]) -> float:
         return float("nan")
     ranks = rankdata(weights[known])
     return float((ranks[inliers].sum() - good * (good + 1) / 2) / (good * bad))
+
+
+def roc_curve(weights: Floats, outliers: NDArray[np.bool_], points: int = 200) -> tuple[Floats, Floats]:
+    """The curve under which `roc_auc` is the area: what is lost and what is caught when low weights are rejected.
+
+    Parameters
+    ----------
+    weights, outliers
+        (m,) as in `roc_auc`.
+    points
+        About how many are kept.
+
+    Returns
+    -------
+    tuple
+        Share (k,) of the inliers and share (k,) of the outliers that are below each threshold, from (0, 0) to
+        (1, 1); edges of the same weight are rejected together. Empty where `roc_auc` is NaN.
+    """
+    known = ~np.isnan(weights)
+    order = np.argsort(weights[known], kind="stable")
+    ranked, bad = weights[known][order], outliers[known][order]
+    if not 0 < bad.sum() < len(bad):
+        return np.empty(0), np.empty(0)
+    last = np.append(np.flatnonzero(ranked[1:] != ranked[:-1]), len(ranked) - 1)  # of each run of equal weights
+    last = last[np.unique(np.linspace(0, len(last) - 1, points).astype(int))]
+    caught, lost = np.cumsum(bad)[last] / bad.sum(), np.cumsum(~bad)[last] / (~bad).sum()
+    return np.append(0, lost), np.append(0, caught)

@@ -1,0 +1,30 @@
+"""``bench report``: score a run again and write its HTML report."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bench.cli.options import Align, AlignOption, ProtocolOption, RunFolder, run_folder
+
+
+def report(
+    run: RunFolder,
+    align: AlignOption = Align.L1,
+    protocol: ProtocolOption = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="The file.  [default: RUN/report.html]")] = None,
+) -> None:
+    """Write one HTML file with findings in words, a leaderboard, figures, failures and the origin of the numbers.
+
+    The file needs no network: open it from disk, send it, print it. The report is about one alignment rule; the
+    leaderboard has all of them, and the report says whether the choice changes the ranking.
+    """
+    from bench.reporting.report.page import FILE_NAME, write_report
+    from bench.reporting.report.realign import under_every_rule
+    from bench.results import score
+    from bench.store import Store
+
+    folder = run_folder(run)
+    store = Store.open(folder)
+    results = score(store, align.value, protocol.value if protocol else None, checkpoints=True)
+    typer.echo(write_report(store, under_every_rule(store, results), out or folder / FILE_NAME))
