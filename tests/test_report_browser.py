@@ -87,7 +87,8 @@ class Visit:
     def column(self, head):
         """Texts of a column of the leaderboard."""
         heads = self.page.locator("#board thead th button").all_inner_texts()
-        return self.page.locator(f"#board tbody tr > :nth-child({heads.index(head) + 1})").all_inner_texts()
+        cells = self.page.locator(f"#board tbody tr > :nth-child({heads.index(head) + 1})").all_inner_texts()
+        return [text.removesuffix(" *") for text in cells]
 
     def numbers(self, head):
         return [float(text) for text in self.column(head) if text != "–"]

@@ -28,8 +28,6 @@ COLUMNS = (
     Column("scene", "Scene", "text", "Instance, or all scenes with ground truth together"),
     Column("protocol", "Protocol", "text", "Which cameras are solved and scored"),
     Column("alignment", "Alignment", "text", "The rule that removed the gauge"),
-    Column("outcome", "Outcome", "text", "How the jobs ended"),
-    Column("best_on", "Best on", "text", "Scenes on which it is among the best"),
     Column("rank", "Rank", "number", "Rank of the median error; over all scenes the mean rank, failures last"),
     Column("median", "Median °", "deg", "Median error over the scored cameras; over all scenes the geometric mean"),
     Column("mean", "Mean °", "deg", "Mean error over the scored cameras; over all scenes the geometric mean"),
@@ -41,6 +39,8 @@ COLUMNS = (
     Column("speedup", "Times faster", "number", "Than the baseline of the timing run"),
     Column("memory", "MiB", "number", "What solving added to the resident memory, at its peak"),
     Column("cameras", "Cameras", "text", "Solved / scored / all"),
+    Column("best_on", "Best on", "text", "Scenes on which it is among the best"),
+    Column("outcome", "Outcome", "text", "How the jobs ended"),
 )
 
 

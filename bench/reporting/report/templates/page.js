@@ -97,7 +97,7 @@
       line.append(...columns.map((column, k) => {
         const value = get(row, column.key);
         const text = value === null ? "–" : written[column.kind](value);
-        const cell = element(k ? "td" : "th", k || !row.best ? text : `${text} *`, { className: column.kind === "text" ? "" : "number" });
+        const cell = element(k ? "td" : "th", k || !row.best ? text : `${text} *`, { className: column.kind !== "text" ? "number" : column.key === "outcome" ? "wrap" : "" });
         if (!k) cell.scope = "row";
         return cell;
       }));
