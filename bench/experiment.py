@@ -1,17 +1,19 @@
 """From a suite to jobs: the cross product of instances, methods and seeds, each with its identity."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bench import named, registry, selection
-from bench.errors import InputError
+from bench.errors import InputError, shown
 from bench.registry import Catalog, Info, Missing, Source, parameters_of
 from bench.store import SCHEMA, Job, digest
 
 DEFAULT_SUITE = "quick"
 SUITES = "bench.suites"
+_MOST_REPEATS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,15 @@ class Suite:
     memory_gib: float = 8.0
     rounds: int = 5
     baseline: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that no run can have."""
+        for key in ("seeds", "rounds"):
+            if not 1 <= getattr(self, key) <= _MOST_REPEATS:
+                raise InputError(f"suite {self.name}: '{key}' is {getattr(self, key)}, not from 1 to {_MOST_REPEATS}")
+        for key in ("timeout_s", "memory_gib"):
+            if not 0 < getattr(self, key) < math.inf:
+                raise InputError(f"suite {self.name}: '{key}' is {getattr(self, key)}, not a positive number")
 
 
 @dataclass(frozen=True)
@@ -94,16 +105,16 @@ _FIELDS: dict[str, tuple[type, ...]] = {
 def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
     for key, value in content.items():
         if key not in _FIELDS:
-            raise InputError(f"{where}: unknown key '{key}'{registry.suggestion(key, _FIELDS)}")
+            raise InputError(f"{where}: unknown key {shown(key)}{registry.suggestion(key, _FIELDS)}")
         if not isinstance(value, _FIELDS[key]) or isinstance(value, bool):
-            raise InputError(f"{where}: '{key}' must be a {_FIELDS[key][0].__name__}, not {value!r}")
+            raise InputError(f"{where}: '{key}' must be a {_FIELDS[key][0].__name__}, not {shown(value)}")
     for key in ("datasets", "methods"):
         if not content.get(key) or not all(isinstance(text, str) for text in content[key]):
             raise InputError(f"{where}: '{key}' must be a list of selections, such as {key} = ['name[parameter=1]']")
         content[key] = tuple(content[key])
     if "baseline" in content and content["baseline"] not in content["methods"]:
         guess = registry.suggestion(content["baseline"], content["methods"])
-        raise InputError(f"{where}: the baseline '{content['baseline']}' is not one of its methods{guess}")
+        raise InputError(f"{where}: the baseline {shown(content['baseline'])} is not one of its methods{guess}")
     return Suite(name, content.pop("title", name), **content)
 
 

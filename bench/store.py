@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from bench import npz
 from bench.arrays import load_estimate, load_problem, save_problem
 from bench.errors import InputError
 from bench.problem import Estimate, Instance
@@ -121,10 +122,11 @@ class Store:
         """Every plan, oldest first."""
         found = []
         for path in sorted((self.folder / "plans").glob("*.json")):
-            content = _read_json(path)
-            jobs = tuple(Job(**job) for job in content["jobs"])
-            missing, baseline = tuple(content["missing"]), content.get("baseline", "")
-            found.append(Plan(content["suite"], jobs, missing, content["command"], baseline))
+            with _reading(path):
+                content = _read_json(path)
+                jobs = tuple(_job(job) for job in content["jobs"])
+                missing, baseline = tuple(content["missing"]), content.get("baseline", "")
+                found.append(Plan(content["suite"], jobs, missing, content["command"], baseline))
         return found
 
     def jobs(self) -> list[Job]:
@@ -161,12 +163,17 @@ class Store:
     def instance(self, key: str) -> Instance:
         """Read an instance back."""
         folder = self.folder / "instances" / key
-        with np.load(folder / "truth.npz", allow_pickle=False) as data:
-            truth = data.get("truth", None)
-            outliers = data.get("outliers", None)
-        facts = _read_json(folder / "instance.json")
-        facts["notes"] = tuple(facts["notes"])
-        return Instance(load_problem(folder / "problem.npz"), truth, outliers=outliers, **facts)
+        with _reading(folder):
+            problem = load_problem(folder / "problem.npz")
+            hidden = npz.load(folder / "truth.npz", ("truth", "outliers"))
+            if {"truth": (problem.n, 3, 3), "outliers": (problem.m,)} | {k: v.shape for k, v in hidden.items()} != {
+                "truth": (problem.n, 3, 3),
+                "outliers": (problem.m,),
+            }:
+                raise ValueError("truth.npz does not fit problem.npz")
+            facts = _read_json(folder / "instance.json")
+            facts["notes"] = tuple(facts["notes"])
+            return Instance(problem, hidden.get("truth"), outliers=hidden.get("outliers"), **facts)
 
     def record(self, job_id: str) -> dict[str, Any] | None:
         """Record of a job, or None where there is none that can be read."""
@@ -212,10 +219,30 @@ def _write_json(path: Path, content: Mapping[str, Any]) -> None:
     temporary.replace(path)
 
 
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file may fail in any of a dozen ways
+        raise InputError(f"{path} cannot be read ({type(error).__name__}: {error}); delete it and run again") from error
+
+
+def _job(content: Mapping[str, Any]) -> Job:
+    job = Job(**content)
+    texts = (job.id, job.dataset, job.instance, job.instance_key, job.method, job.title, job.origin)
+    if not all(isinstance(text, str) for text in texts) or not isinstance(job.parameters, dict):
+        raise TypeError("a job is described by text and parameters")
+    if not (job.id.isalnum() and job.instance_key.isalnum() and isinstance(job.seed, int)):
+        raise ValueError("a key has characters other than letters and digits")
+    return job
+
+
 def _read_json(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path} cannot be read ({error}); delete it and run again") from error
     if not isinstance(content, dict):
         raise InputError(f"{path} does not hold a record; delete it and run again")

@@ -1,6 +1,5 @@
 """Run one job: start its child, watch it, and turn whatever happened into a record."""
 
-import json
 import threading
 import time
 from collections.abc import Mapping
@@ -10,9 +9,10 @@ from typing import Any
 
 from bench import provenance
 from bench.execution import outcome
-from bench.execution.child import RESULT_FILE, Request
+from bench.execution.child import Request
 from bench.execution.launch import LOG_FILE, Launcher, LaunchError
 from bench.execution.outcome import Outcome
+from bench.execution.report import read_report
 from bench.execution.supervise import Limits, supervise
 
 LOG_TAIL = 4000  # characters of the child's output that a record keeps
@@ -35,12 +35,7 @@ def execute(
     except LaunchError as error:
         ended = Outcome(outcome.CRASHED, str(error))
     if isinstance(ended, int):
-        try:
-            report = json.loads((folder / RESULT_FILE).read_text(encoding="utf-8"))
-        except (FileNotFoundError, ValueError):
-            ended = outcome.crashed(ended)
-        else:
-            ended = Outcome(report.pop("kind"), report.pop("detail"))
+        ended, report = read_report(folder) or (outcome.crashed(ended), {})
     report["wall_s"] = time.monotonic() - start
     if ended.kind != outcome.OK:
         report["log"] = _tail(folder / LOG_FILE)

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from bench.execution import outcome
-from bench.execution.child import ESTIMATE_FILE, Request
+from bench.execution.child import Request
 from bench.execution.job import execute, record_of
 from bench.execution.launch import Launcher
 from bench.execution.outcome import Outcome
+from bench.execution.report import ESTIMATE_FILE
 from bench.execution.supervise import Interrupted, Limits
 from bench.experiment import Cell
 from bench.store import Store
