@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench import npz
-from bench.errors import InputError
+from bench.errors import InputError, shown
 from bench.problem import Checkpoint, Estimate, Problem
 
 
@@ -82,4 +82,4 @@ def _floats(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
 
 
 def _said(error: Exception) -> str:
-    return f"there is no array {error}" if isinstance(error, KeyError) else str(error)
+    return f"there is no array {error}" if isinstance(error, KeyError) else shown(str(error), 200)

@@ -27,7 +27,7 @@ import numpy as np
 
 from bench import npz
 from bench.arrays import load_estimate, load_problem, save_problem
-from bench.errors import InputError
+from bench.errors import InputError, shown
 from bench.problem import Estimate, Instance
 
 SCHEMA = 1
@@ -226,7 +226,8 @@ def _reading(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except Exception as error:  # a damaged file may fail in any of a dozen ways
-        raise InputError(f"{path} cannot be read ({type(error).__name__}: {error}); delete it and run again") from error
+        why = shown(f"{type(error).__name__}: {error}", 200)
+        raise InputError(f"{path} cannot be read ({why}); delete it and run again") from error
 
 
 def _job(content: Mapping[str, Any]) -> Job:

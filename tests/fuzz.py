@@ -46,6 +46,7 @@ class Watch:
         self.rng = random.Random(seed)
         self.failures: dict[str, bytes] = {}
         self.fed = self.refused = 0
+        self.was_refused = False
         self.slowest = self.rss = 0.0
         self.start = time.monotonic()
         self._temporary = tempfile.TemporaryDirectory(
@@ -74,6 +75,7 @@ class Watch:
         signal.setitimer(signal.ITIMER_REAL, SECONDS)
         try:
             failure = self._read(data)
+            self.refused += self.was_refused
         except HangError as error:
             failure = _signature(error)
         finally:
@@ -92,10 +94,11 @@ class Watch:
     def _read(self, data: bytes) -> str:
         from bench.errors import InputError
 
+        self.was_refused = False
         try:
             self.parser.read(data, self.folder)
         except InputError as error:
-            self.refused += 1
+            self.was_refused = True
             return complaint(str(error), str(self.folder) if self.parser.names_file else "")
         except HangError:
             raise
@@ -150,9 +153,7 @@ def _signature(error: BaseException) -> str:
         if file.parent.name in ("bench", "formats", "papers", "execution", "datasets", "methods"):
             place = f"{file.name}:{trace.tb_lineno}"
         trace = trace.tb_next
-    return (
-        f"{type(error).__name__} at {place}: {str(error)[:100]}" if not place else f"{type(error).__name__} at {place}"
-    )
+    return f"{type(error).__name__} at {place or str(error)[:100]}"
 
 
 def _hang(number: int, frame: FrameType | None) -> None:
@@ -187,7 +188,9 @@ def by_coverage(watch: Watch) -> None:
 
     def mutator(data: bytes, most: int, seed: int) -> bytes:
         rng = random.Random(seed)
-        if watch.parser.container == "plain" and rng.random() < 0.3:
+        if rng.random() < 0.4:  # what reached new code is often broken beyond recognition
+            return watch.mutated()[:most]
+        if watch.parser.container == "plain" and rng.random() < 0.4:
             return atheris.Mutate(data, most)[:most]
         with contextlib.suppress(Exception):  # what is not packed as it should be cannot be damaged inside
             return mutated(data, rng.choice(watch.parser.seeds), watch.parser.container, rng)[:most]

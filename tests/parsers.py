@@ -16,7 +16,8 @@ import numpy as np
 from scenes import UNREGISTERED, bundle_camera, egs_line, write_scene
 
 from bench import named, registry, selection, so3
-from bench.datasets._archive import Archive, damaged, unpack
+from bench.datasets._archive import damaged, unpack
+from bench.datasets._download import Archive
 from bench.datasets.one_dsfm import FILES
 from bench.execution.report import read_report
 from bench.experiment import load_suite

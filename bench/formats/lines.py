@@ -103,6 +103,8 @@ def parse(path: Path, source: Iterable[Row], ids: int, numbers: int, layout: str
         except (ValueError, OverflowError):
             raise InputError(f"{path}:{line}: {_culprit(words, ids)}; a line holds {layout}") from None
         lines.append(line)
+    if not lines:
+        raise InputError(f"{path}: there is no line in it; a line holds {layout}")
     return Table(
         path,
         np.array(lines, dtype=np.int64),
