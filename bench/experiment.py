@@ -49,10 +49,10 @@ class Suite:
         """Refuse numbers that no run can have."""
         for key in ("seeds", "rounds"):
             if not 1 <= getattr(self, key) <= _MOST_REPEATS:
-                raise InputError(f"suite {self.name}: '{key}' is {getattr(self, key)}, not from 1 to {_MOST_REPEATS}")
+                raise InputError(f"'{key}' is {getattr(self, key)}, not from 1 to {_MOST_REPEATS}")
         for key in ("timeout_s", "memory_gib"):
             if not 0 < getattr(self, key) < math.inf:
-                raise InputError(f"suite {self.name}: '{key}' is {getattr(self, key)}, not a positive number")
+                raise InputError(f"'{key}' is {getattr(self, key)}, not a positive number")
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,10 @@ def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
     if "baseline" in content and content["baseline"] not in content["methods"]:
         guess = registry.suggestion(content["baseline"], content["methods"])
         raise InputError(f"{where}: the baseline {shown(content['baseline'])} is not one of its methods{guess}")
-    return Suite(name, content.pop("title", name), **content)
+    try:
+        return Suite(name, content.pop("title", name), **content)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
 def narrowed(suite_selections: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
