@@ -13,3 +13,13 @@ def shown(value: object, most: int = 80) -> str:
     """A word or value from outside as it may stand in a message, whatever it holds."""
     text = repr(value)
     return text if len(text) <= most else f"{text[:most]}..."
+
+
+def described(error: BaseException, most: int = 300) -> str:
+    """Type and message of an exception in one printable line; a plug-in's own may even fail to be written."""
+    try:
+        text = " ".join(str(error).split())
+    except Exception:
+        text = "(its message cannot be written)"
+    text = "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text[: most + 1])
+    return f"{type(error).__name__}: {text if len(text) <= most else text[:most] + '…'}"

@@ -24,7 +24,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from bench import selection
-from bench.errors import InputError, shown
+from bench.errors import InputError, described, shown
 from bench.problem import Estimate, Floats, Instance, Problem
 
 PACKAGES = {"method": "bench.methods", "dataset": "bench.datasets"}
@@ -281,7 +281,7 @@ def scan(kind: str, origins: Iterable[str]) -> Catalog:
         try:
             found = infos(import_origin(origin), kind)
         except (Exception, SystemExit) as error:  # a plug-in may fail in any way, and must stay visible
-            broken[origin] = _why(error)
+            broken[origin] = described(error)
             continue
         for info in found:
             if info.name in entries:
@@ -339,15 +339,6 @@ def _plugin_path(path: str | Path) -> str:
     if "\0" in str(path) or not (resolved := Path(path).resolve()).is_file() or resolved.suffix != ".py":
         raise InputError(f"--plugin {str(path)!r}: there is no such Python file")
     return str(resolved)
-
-
-def _why(error: BaseException) -> str:
-    """One line that says how a plug-in failed; its exceptions are its own, and may fail to be written."""
-    try:
-        text = " ".join(str(error).split())
-    except Exception:
-        text = "an exception without words"
-    return f"{type(error).__name__}: {text if len(text) <= 300 else text[:300] + '…'}"
 
 
 def infos(module: types.ModuleType, kind: str) -> list[Info]:

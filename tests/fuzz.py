@@ -207,7 +207,7 @@ def by_coverage(watch: Watch) -> None:
         arguments = [
             "fuzz",
             str(folder),
-            "-max_len=100000",
+            "-max_len=20000",
             "-verbosity=0",
             "-rss_limit_mb=0",
         ]

@@ -69,7 +69,7 @@ TOKENS = [
         b"{}",
         b"../../x",
         b"/etc/passwd",
-        b"x" * 70_000,
+        b"x" * 15_000,
         b"<b>",
         b"VERTEX_SE2",
         b"EDGE3",

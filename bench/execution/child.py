@@ -21,10 +21,11 @@ import numpy as np
 
 from bench import registry
 from bench.arrays import load_problem, save_estimate
+from bench.errors import described
 from bench.execution import outcome
 from bench.execution.outcome import Outcome
 from bench.execution.report import ESTIMATE_FILE, RESULT_FILE
-from bench.execution.validate import scalars, what_is_wrong
+from bench.execution.validate import kept_warnings, scalars, what_is_wrong
 from bench.problem import Estimate, Floats, Problem, Skipped
 from bench.seeds import stream
 
@@ -75,14 +76,14 @@ def run(request: Request) -> None:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             ended = _solve(request, result)
-        result["warnings"] = sorted({f"{w.category.__name__}: {w.message}" for w in caught})
+        result["warnings"] = kept_warnings(caught)
     except Skipped as skip:
         ended = Outcome(outcome.SKIPPED, str(skip))
     except MemoryError as error:
         ended = Outcome(outcome.OUT_OF_MEMORY, str(error))
     except Exception as error:
         traceback.print_exc()
-        ended = Outcome(outcome.ERROR, f"{type(error).__name__}: {error}")
+        ended = Outcome(outcome.ERROR, described(error))
     result |= {"kind": ended.kind, "detail": ended.detail}
     temporary = Path(request.folder, RESULT_FILE + ".part")
     temporary.write_text(json.dumps(result), encoding="utf-8")

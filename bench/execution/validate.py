@@ -3,17 +3,21 @@
 A plug-in may return anything. What passes here is plain arrays and plain numbers, so that nothing later has to ask.
 """
 
+import itertools
 import math
+import warnings
 from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
+from bench.errors import described
 from bench.problem import ROTATION_TOLERANCE, Checkpoint, Estimate, Problem
 
 MOST_TEXT = 100_000  # characters of all notes, and of the stop reason
 MOST_CHECKPOINTS = 100_000
+MOST_WARNINGS = 50
 
 
 def what_is_wrong(problem: Problem, estimate: Any, elapsed: float) -> str:
@@ -50,6 +54,12 @@ def scalars(estimate: Estimate) -> dict[str, Any]:
             for c in estimate.checkpoints
         ],
     }
+
+
+def kept_warnings(caught: Iterable[warnings.WarningMessage]) -> list[str]:
+    """Some of the different warnings of a solution, each on a line."""
+    different = {described(w.message): None for w in itertools.islice(caught, 10_000) if isinstance(w.message, Warning)}
+    return sorted(different)[:MOST_WARNINGS]
 
 
 def _complaints(problem: Problem, estimate: Estimate, elapsed: float) -> Iterable[str]:
@@ -109,9 +119,9 @@ def _wrong_array(what: str, array: Any) -> str:
 
 def _wrong_texts(estimate: Estimate) -> str:
     notes, reason = estimate.notes, estimate.stop_reason
-    if not isinstance(reason, str) or len(reason) > MOST_TEXT:
+    if not _is_text(reason) or len(reason) > MOST_TEXT:
         return f"stop_reason must be text of at most {MOST_TEXT} characters, not {_brief(reason)}"
-    if not isinstance(notes, tuple | list) or not all(isinstance(note, str) for note in notes):
+    if not isinstance(notes, tuple | list) or not all(map(_is_text, notes)):
         return f"notes must be a tuple of sentences, not {_brief(notes)}"
     if sum(map(len, notes)) > MOST_TEXT:
         return f"notes must have at most {MOST_TEXT} characters together"
@@ -133,6 +143,11 @@ def _wrong_checkpoint(k: int, checkpoint: Checkpoint, n: int) -> str:
     if not isinstance(facts, Mapping) or not all(isinstance(f, str) and _is_number(v) for f, v in facts.items()):
         return f"diagnostics of checkpoint {k} must be named numbers, not {_brief(facts)}"
     return _wrong_rotations(f"checkpoint {k}", checkpoint.rotations, n)
+
+
+def _is_text(value: Any) -> bool:
+    """Text that a file and a terminal can hold: no half of a surrogate pair."""
+    return isinstance(value, str) and not any("\ud800" <= sign <= "\udfff" for sign in value)
 
 
 def _is_whole(value: Any) -> bool:
