@@ -39,7 +39,7 @@ def read(kind: str, package: str, name: str) -> tuple[str, dict[str, Any]]:
     """
     by_path = name.endswith(".toml")
     file: Traversable = Path(name) if by_path else resources.files(package) / f"{name}.toml"
-    if "\0" in name or not (by_path or _is_plain(name)) or not file.is_file():
+    if not (by_path or _is_plain(name)) or not _is_file(file):
         near = "" if by_path else suggestion(name, names(package))
         raise InputError(f"there is no {kind} {shown(name)}{near}")
     with file.open("rb") as stream:
@@ -47,6 +47,13 @@ def read(kind: str, package: str, name: str) -> tuple[str, dict[str, Any]]:
     if len(data) > _MOST_BYTES:
         raise InputError(f"{kind} {name} has more than {_MOST_BYTES} bytes; is this the right file?")
     return Path(file.name).stem, _parsed(f"{kind} {name}", data)
+
+
+def _is_file(file: Traversable) -> bool:
+    try:
+        return file.is_file()
+    except (OSError, ValueError):  # a name that is too long, or that no system has
+        return False
 
 
 def _is_plain(name: str) -> bool:
@@ -62,7 +69,7 @@ def _parsed(where: str, data: bytes) -> dict[str, Any]:
     except RecursionError:
         raise InputError(f"{where} is nested too deeply; a table in a table is the most that is needed") from None
     except ValueError as error:  # of TOML's own, of UTF-8, or of a number with thousands of digits
-        raise InputError(f"{where} is not valid TOML: {' '.join(str(error).split())}") from error
+        raise InputError(f"{where} is not valid TOML: {' '.join(str(error).split())[-200:]}") from error
     return content
 
 

@@ -319,7 +319,7 @@ def parameters_of(configured: Any) -> dict[str, Any]:
 
 def suggestion(name: str, candidates: Iterable[str]) -> str:
     """``"; did you mean 'x'?"`` for the nearest candidate, or the list of all where none is near."""
-    names = sorted(candidates)
+    names = sorted(candidate[:80] for candidate in candidates)[:100]
     near = difflib.get_close_matches(name[:80], names, n=1, cutoff=0.5)
     if near:
         return f"; did you mean '{near[0]}'?"
@@ -336,9 +336,13 @@ def _entry_points(kind: str) -> list[str]:
 
 
 def _plugin_path(path: str | Path) -> str:
-    if "\0" in str(path) or not (resolved := Path(path).resolve()).is_file() or resolved.suffix != ".py":
-        raise InputError(f"--plugin {str(path)!r}: there is no such Python file")
-    return str(resolved)
+    try:
+        resolved = Path(path).resolve()
+        if resolved.is_file() and resolved.suffix == ".py":
+            return str(resolved)
+    except (OSError, ValueError):  # a name that no system has
+        pass
+    raise InputError(f"--plugin {shown(str(path))}: there is no such Python file")
 
 
 def infos(module: types.ModuleType, kind: str) -> list[Info]:

@@ -1,9 +1,13 @@
 """Whatever a file holds, it is read, or refused in one line that names it; what once failed stays here as a test."""
 
+import os
 import random
+import struct
 import warnings
+import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fuzz import CORPUS, complaint
 from hypothesis import given, settings
@@ -12,6 +16,11 @@ from mutation import mutated
 from parsers import PARSERS
 
 from bench.errors import InputError
+from bench.experiment import load_suite
+from bench.formats import read_graph
+from bench.formats.npz import read_topology
+from bench.papers.layout import load_layout
+from bench.registry import catalog
 
 
 def read(name: str, data: bytes, folder: Path) -> None:
@@ -78,10 +87,60 @@ def test_the_fuzzer_finds_what_is_wrong(tmp_path: Path, monkeypatch: pytest.Monk
 
     monkeypatch.setitem(parsers.PARSERS, "bad", parsers.Parser((b"\x7f",), bad, names_file=False))
     monkeypatch.setattr(fuzz, "CORPUS", tmp_path)
-    monkeypatch.setattr(fuzz, "SECONDS", 0.2)
     watch = fuzz.Watch("bad", 4, seed=0)
-    for data in (b"fine", b"12\xff34", b"\xfe", b"m"):
+    for data in (b"fine", b"12\xff34", b"m"):
         watch.feed(data)
-    assert [failure.split(" ")[0] for failure in watch.failures] == ["KeyError", "HangError", "memory:"]
+    monkeypatch.setattr(fuzz, "SECONDS", 0.5)
+    watch.feed(b"\xfe")
+    watch.close()
+    assert [failure.split(" ")[0] for failure in watch.failures] == ["KeyError", "memory:", "HangError"]
     assert b"\xff" in {path.read_bytes() for path in (tmp_path / "bad").iterdir()}
     assert watch.refused == 1
+
+
+@pytest.mark.parametrize("name", ["x" * 5000, "a\0b", "/dev/zero", "/dev/null", "/", "..", ""])
+@pytest.mark.parametrize("ending", ["", ".toml", ".npz", ".txt", ".g2o", ".py"])
+def test_names_that_no_file_has_are_refused(name: str, ending: str) -> None:
+    for reader in (read_graph, load_suite, load_layout, lambda path: catalog("method", [path])):
+        with pytest.raises(InputError) as caught:
+            reader(name + ending)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.parametrize("name", ["EGs.txt", "graph.g2o", "graph.npz", "graph.txt"])
+def test_a_link_to_what_never_ends_is_refused(name: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for target in (tmp_path / "pipe", Path("/dev/zero")):
+        (tmp_path / name).unlink(missing_ok=True)
+        (tmp_path / name).symlink_to(target)
+        with pytest.raises(InputError, match=r"no such file|not a plain file|there is no"):
+            read_graph(tmp_path / name)
+
+
+def test_an_archive_of_arrays_may_not_be_far_larger_than_its_file(tmp_path: Path) -> None:
+    """Zeros of 200 MiB in a file of 200 kB, and a header that claims 8 TB of them."""
+    bomb = tmp_path / "bomb.npz"
+    np.savez_compressed(bomb, n=3, edges=np.zeros((200 * 2**20 // 16, 2), np.int64))
+    with pytest.raises(InputError, match="far more than such a file can hold"):
+        read_topology(bomb)
+    header = np.lib.format.magic(1, 0) + struct.pack("<H", 118)
+    header += f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({10**12},)}}".ljust(118).encode()
+    with zipfile.ZipFile(bomb, "w") as archive:
+        archive.writestr("n.npy", header + b"\0" * 8)
+        archive.writestr("edges.npy", header)
+    with pytest.raises(InputError, match=r"'n' claims the shape \(1000000000000,\), but holds something else"):
+        read_topology(bomb)
+
+
+def test_nothing_is_unpickled(tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+
+    class Evil:
+        def __reduce__(self) -> object:
+            return (Path.touch, (mark,))
+
+    np.savez(tmp_path / "evil.npz", n=np.array([Evil()], dtype=object), edges=np.array([Evil()], dtype=object))
+    with pytest.raises(InputError, match="'n' holds object"):
+        read_topology(tmp_path / "evil.npz")
+    assert not mark.exists()
