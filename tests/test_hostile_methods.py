@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from graphs import random_edges, simulated
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bench.execution.report import ESTIMATE_FILE, RESULT_FILE, read_report
@@ -155,7 +155,7 @@ anything = st.one_of(
 FIELDS = ("edge_weights", "iterations", "stop_reason", "cost", "certificate", "checkpoints", "conversion_s", "notes")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(fields=st.dictionaries(st.sampled_from([*FIELDS, "rotations"]), anything))
 def test_any_fields_are_valid_or_said_to_be_wrong(fields: dict[str, Any]) -> None:
     answer = estimate(**fields)

@@ -89,7 +89,7 @@ def _parsed(name: str, where: str, content: dict[str, Any], folder: Traversable,
     for key, value in head.items():
         if not isinstance(value, str):
             raise InputError(f"{where}: '{key}' must be a str, not {shown(value)}")
-    items = {key: _item(f"{where}: {key}", value) for key, value in content.items()}
+    items = {key: _item(f"{where}: {_brief(key)}", value) for key, value in content.items()}
     return Layout(name, head["title"] or name, head["cite"], items, folder, reference)
 
 
@@ -117,7 +117,7 @@ def _made(cls: Any, content: Any, where: str) -> Any:
     for key, f in fields.items():
         if key not in content and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING:
             raise InputError(f"{where}: key '{key}' is missing")
-    values = {key: _value(hints[key], value, f"{where}.{key}") for key, value in content.items()}
+    values = {key: _value(hints[key], value, f"{where}.{_brief(key)}") for key, value in content.items()}
     try:
         return cls(**values)
     except ValueError as error:
@@ -132,7 +132,7 @@ def _value(hint: Any, value: Any, where: str) -> Any:
     if origin is tuple and isinstance(value, list):
         return tuple(_value(arguments[0], entry, where) for entry in value)
     if origin is Mapping and isinstance(value, dict):
-        return {key: _value(arguments[1], entry, f"{where}.{key}") for key, entry in value.items()}
+        return {key: _value(arguments[1], entry, f"{where}.{_brief(key)}") for key, entry in value.items()}
     if origin is typing.Literal:
         fits, wanted = value in arguments, " or ".join(map(repr, arguments))
     else:
@@ -143,3 +143,7 @@ def _value(hint: Any, value: Any, where: str) -> Any:
     if not fits:
         raise InputError(f"{where} must be {wanted}, not {shown(value)}")
     return value
+
+
+def _brief(key: str) -> str:
+    return key if key.isprintable() and len(key) <= 80 else shown(key)
