@@ -1,20 +1,14 @@
 """Problems and estimates as ``.npz`` files, float64 and unrounded, read without pickle."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from bench import npz
+from bench.errors import InputError, shown
 from bench.problem import Checkpoint, Estimate, Problem
-
-
-@contextmanager
-def opened(path: Path) -> Iterator[Any]:
-    """The arrays in an ``.npz``; numpy alone leaves the file open where it is damaged."""
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-        yield data
 
 
 def save_problem(path: Path, problem: Problem) -> None:
@@ -27,10 +21,15 @@ def save_problem(path: Path, problem: Problem) -> None:
 
 
 def load_problem(path: Path) -> Problem:
-    """Read what `save_problem` wrote."""
-    with opened(path) as data:
-        weights = data.get("weights", None)
-        return Problem(int(data["n"]), data["edges"], data["rotations"], weights)
+    """Read what `save_problem` wrote; raises `InputError` where the file holds something else."""
+    arrays = npz.load(path, ("n", "edges", "rotations", "weights"))
+    try:
+        n = arrays["n"]
+        if n.shape != () or n.dtype.kind not in "iu":
+            raise InputError(f"n must be a whole number, not {n.dtype} of shape {n.shape}")
+        return Problem(int(n), arrays["edges"], arrays["rotations"], arrays.get("weights"))
+    except (KeyError, InputError) as error:
+        raise InputError(f"{path}: {_said(error)}") from error
 
 
 def save_estimate(path: Path, estimate: Estimate) -> None:
@@ -45,12 +44,20 @@ def save_estimate(path: Path, estimate: Estimate) -> None:
 
 
 def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
-    """Read what `save_estimate` wrote, with the scalars that the record holds."""
-    with opened(path) as data:
-        states = data.get("checkpoints", ())
+    """Read what `save_estimate` wrote, with the scalars that the record holds.
+
+    Raises
+    ------
+    InputError
+        Where the file holds something else, or another number of checkpoints than the record.
+    """
+    arrays = npz.load(path, ("rotations", "edge_weights", "checkpoints"))
+    try:
+        n = len(_floats(arrays["rotations"], (-1, 3, 3)))
+        states = _floats(arrays["checkpoints"], (-1, n, 3, 3)) if "checkpoints" in arrays else ()
         return Estimate(
-            rotations=data["rotations"],
-            edge_weights=data.get("edge_weights", None),
+            rotations=arrays["rotations"],
+            edge_weights=_floats(arrays["edge_weights"], (-1,)) if "edge_weights" in arrays else None,
             iterations=scalars.get("iterations"),
             stop_reason=scalars.get("stop_reason", ""),
             cost=scalars.get("cost"),
@@ -62,3 +69,17 @@ def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
             conversion_s=scalars.get("conversion_s", 0.0),
             notes=tuple(scalars.get("notes", ())),
         )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: {_said(error)}") from error
+
+
+def _floats(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    if array.dtype != np.float64 or array.ndim != len(shape):
+        raise ValueError(f"an array is {array.dtype} of shape {array.shape}")
+    if any(want not in (-1, has) for want, has in zip(shape, array.shape, strict=True)):
+        raise ValueError(f"an array has shape {array.shape}")
+    return array
+
+
+def _said(error: Exception) -> str:
+    return f"there is no array {error}" if isinstance(error, KeyError) else shown(str(error), 200)

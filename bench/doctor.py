@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.errors import InputError
+from bench.errors import InputError, described
 from bench.execution import outcome
-from bench.plan import Job, Plan
-from bench.store import ASIDE, UNREADABLE, Store
+from bench.plan import Job, Plan, decode, encode
+from bench.store import ASIDE, Store
 
 
 @dataclass(frozen=True)
@@ -109,12 +109,12 @@ def _unplanned(store: Store, path: Path) -> Finding:
 
 
 def _job(store: Store, job_id: str) -> Job:
-    record = store.record(job_id)
+    record = store.record(job_id) or {}
     try:
-        assert record is not None
-        return Job(**record["job"])
-    except UNREADABLE as error:
-        raise InputError(f"{type(error).__name__} {error}") from error
+        job = Job(**record["job"])
+        return decode(encode(Plan("", (job,)))).jobs[0]
+    except Exception as error:  # it may be told in any wrong way
+        raise InputError(described(error)) from error
 
 
 def _instances(store: Store) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""The one exception whose message is written for the user."""
+"""The one exception whose message is written for the user, and how that quotes what came from outside."""
 
 
 class InputError(ValueError):
@@ -7,3 +7,19 @@ class InputError(ValueError):
     The message is one sentence that says what is wrong, where (file and line, or the nearest valid
     name) and what to do. The command line prints it without a traceback and exits with code 2.
     """
+
+
+def shown(value: object, most: int = 80) -> str:
+    """A word or value from outside as it may stand in a message, whatever it holds."""
+    text = repr(value)
+    return text if len(text) <= most else f"{text[:most]}..."
+
+
+def described(error: BaseException, most: int = 300) -> str:
+    """Type and message of an exception in one printable line; a plug-in's own may even fail to be written."""
+    try:
+        text = " ".join(str(error).split())
+    except Exception:
+        text = "(its message cannot be written)"
+    text = "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text[: most + 1])
+    return f"{type(error).__name__}: {text if len(text) <= most else text[:most] + '…'}"

@@ -1,12 +1,13 @@
 """From a suite to jobs: the cross product of instances, methods and seeds, each with its identity."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bench import budget, named, registry, selection
-from bench.errors import InputError
+from bench.errors import InputError, shown
 from bench.plan import Job
 from bench.registry import Catalog, Info, Missing, Source, parameters_of
 from bench.store import digest
@@ -14,6 +15,7 @@ from bench.store import digest
 DEFAULT_SUITE = "quick"
 SUITES = "bench.suites"
 IDENTITY = 1  # raised when what a job's id is made of changes, so that no old record is taken for a new one
+_MOST_REPEATS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,15 @@ class Suite:
     rounds: int = 5
     baseline: str = ""
     budget: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that no run can have."""
+        for key in ("seeds", "rounds"):
+            if not 1 <= getattr(self, key) <= _MOST_REPEATS:
+                raise InputError(f"'{key}' is {getattr(self, key)}, not from 1 to {_MOST_REPEATS}")
+        for key in ("timeout_s", "memory_gib"):
+            if not 0 < getattr(self, key) < math.inf:
+                raise InputError(f"'{key}' is {getattr(self, key)}, not a positive number")
 
 
 @dataclass(frozen=True)
@@ -100,22 +111,25 @@ _FIELDS: dict[str, tuple[type, ...]] = {
 def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
     for key, value in content.items():
         if key not in _FIELDS:
-            raise InputError(f"{where}: unknown key '{key}'{registry.suggestion(key, _FIELDS)}")
+            raise InputError(f"{where}: unknown key {shown(key)}{registry.suggestion(key, _FIELDS)}")
         if not isinstance(value, _FIELDS[key]) or isinstance(value, bool):
-            raise InputError(f"{where}: '{key}' must be a {_FIELDS[key][0].__name__}, not {value!r}")
+            raise InputError(f"{where}: '{key}' must be a {_FIELDS[key][0].__name__}, not {shown(value)}")
     for key in ("datasets", "methods"):
         if not content.get(key) or not all(isinstance(text, str) for text in content[key]):
             raise InputError(f"{where}: '{key}' must be a list of selections, such as {key} = ['name[parameter=1]']")
         content[key] = tuple(content[key])
     if "baseline" in content and content["baseline"] not in content["methods"]:
         guess = registry.suggestion(content["baseline"], content["methods"])
-        raise InputError(f"{where}: the baseline '{content['baseline']}' is not one of its methods{guess}")
+        raise InputError(f"{where}: the baseline {shown(content['baseline'])} is not one of its methods{guess}")
     if "budget" in content:
         if clash := [key for key in ("timeout_s", "memory_gib") if key in content]:
             raise InputError(f"{where}: 'budget' stands for '{clash[0]}' too; keep one of them")
         limits = budget.parse(content["budget"])
         content |= {"timeout_s": limits.seconds, "memory_gib": limits.memory_gib}
-    return Suite(name, content.pop("title", name), **content)
+    try:
+        return Suite(name, content.pop("title", name), **content)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
 def narrowed(suite_selections: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:

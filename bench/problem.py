@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 ROTATION_TOLERANCE = 1e-6
+_LARGEST = 1e6  # the entries of a rotation are at most 1; larger ones still may not overflow a determinant
+MOST_CAMERAS = 10_000_000  # so that a damaged number does not take all memory
 
 
 class Skipped(Exception):  # noqa: N818 - an outcome, not an error
@@ -75,7 +77,7 @@ class Problem:
     @cached_property
     def degree(self) -> Ints:
         """(n,) number of edges at each camera."""
-        return np.bincount(self.edges.ravel(), minlength=self.n).astype(np.int32)
+        return _frozen(np.bincount(self.edges.ravel(), minlength=self.n).astype(np.int32))
 
     @cached_property
     def components(self) -> Ints:
@@ -88,7 +90,7 @@ class Problem:
         sizes = np.bincount(labels)
         rank = np.empty_like(sizes)
         rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))
-        return rank[labels].astype(np.int32)
+        return _frozen(rank[labels].astype(np.int32))
 
     def adjacency(self, values: Floats | None = None) -> "sparse.csr_array":
         """Symmetric (n, n) CSR matrix with `values` (m,), by default ones, on the edges."""
@@ -253,17 +255,27 @@ def oriented(edges: NDArray[np.integer[Any]], rotations: Floats) -> tuple[Ints, 
     return flipped, np.where(reverse[:, None, None], np.swapaxes(rotations, -1, -2), rotations)
 
 
+def _frozen(array: Ints) -> Ints:
+    array.setflags(write=False)
+    return array
+
+
 def _checked_edges(n: int, edges: Any) -> Ints:
     if n < 1:
         raise InputError("the graph has no cameras")
-    out = np.array(edges, dtype=np.int32, order="C")
-    if out.ndim != 2 or out.shape[1] != 2:
-        raise InputError(f"edges must have shape (m, 2), not {out.shape}")
-    if len(out) == 0:
+    if n > MOST_CAMERAS:
+        raise InputError(f"the graph claims {n} cameras, and at most {MOST_CAMERAS} can be handled")
+    given = np.asarray(edges)
+    if given.ndim != 2 or given.shape[1] != 2:
+        raise InputError(f"edges must have shape (m, 2), not {given.shape}")
+    if len(given) == 0:
         raise InputError("the graph has no edges")
-    if (bad := (out < 0) | (out >= n)).any():
+    if given.dtype.kind not in "iu":
+        raise InputError(f"edges must be whole numbers, not {given.dtype}")
+    if (bad := (given < 0) | (given >= n)).any():
         row = int(np.flatnonzero(bad.any(axis=1))[0])
-        raise InputError(f"edge {row} is {_pair(out[row])}, but camera ids go from 0 to {n - 1}")
+        raise InputError(f"edge {row} is {_pair(given[row])}, but camera ids go from 0 to {n - 1}")
+    out = np.array(given, dtype=np.int32, order="C")
     if (bad := out[:, 0] == out[:, 1]).any():
         row = int(np.flatnonzero(bad)[0])
         raise InputError(f"edge {row} is {_pair(out[row])}: a camera with itself")
@@ -279,12 +291,20 @@ def _checked_edges(n: int, edges: Any) -> Ints:
 
 
 def _checked_rotations(edges: Ints, rotations: Any) -> Floats:
-    out = np.array(rotations, dtype=np.float64, order="C")
-    if out.shape != (len(edges), 3, 3):
-        raise InputError(f"rotations must have shape ({len(edges)}, 3, 3), not {out.shape}")
+    given = np.asarray(rotations)
+    if given.dtype.kind not in "iuf":
+        raise InputError(f"rotations must be numbers, not {given.dtype}")
+    if given.shape != (len(edges), 3, 3):
+        raise InputError(f"rotations must have shape ({len(edges)}, 3, 3), not {given.shape}")
+    out = np.array(given, dtype=np.float64, order="C")
     if (bad := ~np.isfinite(out).all(axis=(1, 2))).any():
         row = int(np.flatnonzero(bad)[0])
         raise InputError(f"the rotation of edge {row} {_pair(edges[row])} is not finite")
+    if (bad := (abs(out) > _LARGEST).any(axis=(1, 2))).any():
+        row = int(np.flatnonzero(bad)[0])
+        raise InputError(
+            f"the rotation of edge {row} {_pair(edges[row])} has an entry of size {abs(out[row]).max():.3g}"
+        )
     if (bad := np.linalg.det(out) <= 0).any():
         row = int(np.flatnonzero(bad)[0])
         raise InputError(
@@ -303,9 +323,12 @@ def _checked_rotations(edges: Ints, rotations: Any) -> Floats:
 
 
 def _checked_weights(edges: Ints, weights: Any) -> Floats:
-    out = np.array(weights, dtype=np.float64, order="C")
-    if out.shape != (len(edges),):
-        raise InputError(f"weights must have shape ({len(edges)},), not {out.shape}")
+    given = np.asarray(weights)
+    if given.dtype.kind not in "iuf":
+        raise InputError(f"weights must be numbers, not {given.dtype}")
+    if given.shape != (len(edges),):
+        raise InputError(f"weights must have shape ({len(edges)},), not {given.shape}")
+    out = np.array(given, dtype=np.float64, order="C")
     if (bad := ~(np.isfinite(out) & (out > 0))).any():
         row = int(np.flatnonzero(bad)[0])
         raise InputError(f"the weight of edge {row} {_pair(edges[row])} is {out[row]:g}, not a positive number")

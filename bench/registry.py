@@ -11,6 +11,7 @@ import hashlib
 import importlib
 import importlib.util
 import pkgutil
+import re
 import sys
 import types
 import typing
@@ -23,12 +24,13 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from bench import selection
-from bench.errors import InputError
+from bench.errors import InputError, described, shown
 from bench.problem import Estimate, Floats, Instance, Problem
 
 PACKAGES = {"method": "bench.methods", "dataset": "bench.datasets"}
 ENTRY_POINTS = {"method": "rotsync_bench.methods", "dataset": "rotsync_bench.datasets"}
 _INFO = "__rotsync_info__"
+_NAME = re.compile(r"[^\s\[\],='\"]+")
 
 T = TypeVar("T", bound=type)
 
@@ -132,7 +134,7 @@ class Info:
         for key, value in parameters.items():
             if key not in self.defaults():
                 raise InputError(
-                    f"{self.kind} '{self.name}' has no parameter '{key}'{suggestion(key, self.defaults())}"
+                    f"{self.kind} '{self.name}' has no parameter {shown(key)}{suggestion(key, self.defaults())}"
                 )
             values[key] = _coerced(value, hints[key], f"parameter '{key}' of {self.kind} '{self.name}'")
         try:
@@ -209,6 +211,12 @@ def _declare(
     kind: str, name: str, title: str, cite: str, requires: tuple[str, ...], facts: dict[str, Any], verb: str
 ) -> Callable[[T], T]:
     def register(cls: T) -> T:
+        if not isinstance(name, str) or not _NAME.fullmatch(name):
+            raise TypeError(f"{kind} {name!r}: its name must be one word without quotes and any of [ ] , =")
+        if not all(isinstance(text, str) for text in (title, cite)):
+            raise TypeError(f"{kind} '{name}': its title and cite must be text")
+        if not isinstance(requires, tuple) or not all(isinstance(r, str) and r.isidentifier() for r in requires):
+            raise TypeError(f"{kind} '{name}': requires must be a tuple of top-level packages, such as ('numpy',)")
         if not dataclasses.is_dataclass(cls):
             raise TypeError(f"{kind} '{name}': put @dataclass(frozen=True) below the @{kind} decorator")
         if not callable(getattr(cls, verb, None)):
@@ -236,7 +244,7 @@ class Catalog:
         for origin, why in self.broken.items():
             if origin.removesuffix(".py").replace("/", ".").split(".")[-1].replace("_", "-") == name:
                 raise InputError(f"{self.kind} '{name}' is broken: {why}")
-        raise InputError(f"there is no {self.kind} '{name}'{suggestion(name, self.entries)}")
+        raise InputError(f"there is no {self.kind} {shown(name)}{suggestion(name, self.entries)}")
 
     def __iter__(self) -> Iterator[Info]:
         return iter(self.entries.values())
@@ -262,13 +270,18 @@ def catalog(kind: str, plugins: Sequence[str | Path] = ()) -> Catalog:
     InputError
         On two plug-ins with one name, or a plug-in file that does not exist.
     """
+    return scan(kind, [*_builtin(kind), *_entry_points(kind), *(_plugin_path(p) for p in plugins)])
+
+
+def scan(kind: str, origins: Iterable[str]) -> Catalog:
+    """Import these modules and files, and list what they declare; `InputError` on two of one name."""
     entries: dict[str, Info] = {}
     broken: dict[str, str] = {}
-    for origin in [*_builtin(kind), *_entry_points(kind), *(_plugin_path(p) for p in plugins)]:
+    for origin in origins:
         try:
             found = infos(import_origin(origin), kind)
-        except Exception as error:  # a plug-in may fail in any way, and must stay visible
-            broken[origin] = f"{type(error).__name__}: {error}"
+        except (Exception, SystemExit) as error:  # a plug-in may fail in any way, and must stay visible
+            broken[origin] = described(error)
             continue
         for info in found:
             if info.name in entries:
@@ -306,8 +319,8 @@ def parameters_of(configured: Any) -> dict[str, Any]:
 
 def suggestion(name: str, candidates: Iterable[str]) -> str:
     """``"; did you mean 'x'?"`` for the nearest candidate, or the list of all where none is near."""
-    names = sorted(candidates)
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    names = sorted(candidate[:80] for candidate in candidates)[:100]
+    near = difflib.get_close_matches(name[:80], names, n=1, cutoff=0.5)
     if near:
         return f"; did you mean '{near[0]}'?"
     return f"; there are: {', '.join(names)}" if names else ""
@@ -323,10 +336,13 @@ def _entry_points(kind: str) -> list[str]:
 
 
 def _plugin_path(path: str | Path) -> str:
-    resolved = Path(path).resolve()
-    if not resolved.is_file() or resolved.suffix != ".py":
-        raise InputError(f"--plugin {path}: there is no such Python file")
-    return str(resolved)
+    try:
+        resolved = Path(path).resolve()
+        if resolved.is_file() and resolved.suffix == ".py":
+            return str(resolved)
+    except (OSError, ValueError):  # a name that no system has
+        pass
+    raise InputError(f"--plugin {shown(str(path))}: there is no such Python file")
 
 
 def infos(module: types.ModuleType, kind: str) -> list[Info]:
@@ -369,13 +385,14 @@ def _coerced(value: Any, hint: Any, what: str) -> Any:
             if value is None:
                 return None
         elif option is float and isinstance(value, int | float) and not isinstance(value, bool):
-            return float(value)
+            if isinstance(value, float) or abs(value) < 2**1023:  # a larger whole number is no float
+                return float(value)
         elif option is str and isinstance(value, int | float) and not isinstance(value, bool):
             return str(value)
         elif isinstance(value, option) and not (option is int and isinstance(value, bool)):
             return value
     takes = " or ".join(_spelled(option) for option in options)
-    raise InputError(f"{what} takes {takes}, not {selection.format_value(value)}")
+    raise InputError(f"{what} takes {takes}, not {selection.format_value(value)[:80]}")
 
 
 def _spelled(option: Any) -> str:

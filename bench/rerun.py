@@ -14,6 +14,7 @@ from bench.arrays import load_estimate, save_problem
 from bench.errors import InputError
 from bench.execution import child, outcome
 from bench.execution.outcome import Outcome
+from bench.execution.output import ESTIMATE_FILE
 from bench.execution.single import Answer, SingleSolver
 from bench.execution.supervise import Limits
 from bench.experiment import instance_key
@@ -72,7 +73,7 @@ class Repetition:
             report: dict[str, Any] = {}
             ended = child.solve(request, child.prepare(request), report)
             ok = ended.kind == outcome.OK
-            return ended, report, load_estimate(folder / child.ESTIMATE_FILE, report) if ok else None
+            return ended, report, load_estimate(folder / ESTIMATE_FILE, report) if ok else None
 
     def same(self, ended: Outcome, estimate: Estimate | None) -> bool:
         """Whether it ended as it did then, with every bit of the estimate as it was where that is stored."""

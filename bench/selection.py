@@ -8,15 +8,18 @@ A list is a grid: a selection stands for the cross product of its lists.
 """
 
 import itertools
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bench.errors import InputError
+from bench.errors import InputError, shown
 
 Value = bool | int | float | str | None
 
 _TOKEN = re.compile(r"\s*(?:(?P<quoted>'[^']*'|\"[^\"]*\")|(?P<word>[^\s\[\],='\"]+)|(?P<mark>[\[\],=]))")
+MOST_COMBINATIONS = 100_000
+_NUMBER = re.compile(r"[+-]?(?:inf|(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)", re.ASCII | re.IGNORECASE)
 _CONSTANTS: dict[str, Value] = {"true": True, "false": False, "none": None}
 
 
@@ -48,13 +51,16 @@ def parse(text: str) -> Selection:
         while not reader.accept("]"):
             key = reader.word("a parameter's name")
             if key in grid:
-                raise InputError(f"'{text}': parameter '{key}' is given twice")
+                raise InputError(f"{shown(text, 200)}: parameter {shown(key)} is given twice")
             reader.expect("=")
             grid[key] = reader.values()
             if not reader.accept(","):
                 reader.expect("]")
                 break
     reader.end()
+    count = math.prod(map(len, grid.values()))
+    if count > MOST_COMBINATIONS:
+        raise InputError(f"{shown(text, 200)}: a selection may stand for at most {MOST_COMBINATIONS} configurations")
     return Selection(name, tuple(grid.items()))
 
 
@@ -83,12 +89,12 @@ def format_selection(name: str, parameters: Mapping[str, object]) -> str:
 def _literal(word: str) -> Value:
     if word.lower() in _CONSTANTS:
         return _CONSTANTS[word.lower()]
-    for kind in (int, float):
-        try:
-            return kind(word)
-        except ValueError:
-            pass
-    return word
+    if not _NUMBER.fullmatch(word):
+        return word
+    try:
+        return int(word)
+    except ValueError:
+        return float(word)
 
 
 class _Reader:
@@ -103,9 +109,9 @@ class _Reader:
 
     def fail(self, wanted: str) -> InputError:
         rest = self.text[self.position :].strip()
-        found = f"'{rest}'" if rest else "the end"
+        found = shown(rest) if rest else "the end"
         return InputError(
-            f"cannot read the selection '{self.text}': expected {wanted} at {found}; "
+            f"cannot read the selection {shown(self.text, 200)}: expected {wanted} at {found}; "
             "the form is name[parameter=value,parameter=[value,value]]"
         )
 

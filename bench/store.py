@@ -20,7 +20,6 @@ import os
 import shutil
 import socket
 import tempfile
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -30,14 +29,14 @@ from typing import Any
 
 import numpy as np
 
-from bench import migration
-from bench.arrays import load_estimate, load_problem, opened, save_problem
-from bench.errors import InputError
+from bench import migration, npz
+from bench.arrays import load_estimate, load_problem, save_problem
+from bench.errors import InputError, described, shown
 from bench.plan import Job, Plan, decode, encode, newest
 from bench.problem import Estimate, Instance
 
 ASIDE = "damaged"  # where what cannot be read is moved
-UNREADABLE = (OSError, EOFError, ValueError, KeyError, TypeError, IndexError, AttributeError, zipfile.BadZipFile)
+AGAIN = "run the same command again"
 
 
 def digest(value: Any) -> str:
@@ -95,12 +94,8 @@ class Store:
 
     def plan(self, path: Path) -> Plan:
         """Read one plan; raises `InputError` where that fails."""
-        try:
+        with _reading(path, f"see: python -m bench doctor {self.folder} --repair"):
             return decode(_read_json(path))
-        except UNREADABLE as error:
-            raise InputError(
-                f"{path} cannot be read ({_why(error)}); see: python -m bench doctor {self.folder} --repair"
-            ) from error
 
     def jobs(self) -> list[Job]:
         """The newest job of every cell that was ever planned, in the order of planning."""
@@ -147,18 +142,15 @@ class Store:
     def instance(self, key: str) -> Instance:
         """Read an instance back; raises `InputError` where that fails."""
         folder = self.folder / "instances" / key
-        try:
-            with opened(folder / "truth.npz") as data:
-                truth = data.get("truth", None)
-                outliers = data.get("outliers", None)
+        with _reading(folder, f"run the same command again, or see: python -m bench doctor {self.folder} --repair"):
+            problem = load_problem(folder / "problem.npz")
+            hidden = npz.load(folder / "truth.npz", ("truth", "outliers"))
+            shapes = {"truth": (problem.n, 3, 3), "outliers": (problem.m,)}
+            if any(values.shape != shapes[name] for name, values in hidden.items()):
+                raise ValueError("truth.npz does not fit problem.npz")
             facts = _read_json(folder / "instance.json")
             facts["notes"] = tuple(facts["notes"])
-            return Instance(load_problem(folder / "problem.npz"), truth, outliers=outliers, **facts)
-        except UNREADABLE as error:
-            raise InputError(
-                f"{folder} cannot be read ({_why(error)}); run the same command again, or see: "
-                f"python -m bench doctor {self.folder} --repair"
-            ) from error
+            return Instance(problem, hidden.get("truth"), outliers=hidden.get("outliers"), **facts)
 
     def record(self, job_id: str) -> dict[str, Any] | None:
         """Record of a job, or None where there is none.
@@ -169,15 +161,14 @@ class Store:
             Where there is one that cannot be read.
         """
         path = self.record_path(job_id)
-        try:
-            record = _read_json(path)
+        with _reading(path, AGAIN):
+            try:
+                record = _read_json(path)
+            except FileNotFoundError:
+                return None
             if not isinstance(record["outcome"], str) or not isinstance(record["status"], str):
                 raise ValueError("no outcome")
-        except FileNotFoundError:
-            return None
-        except UNREADABLE as error:
-            raise InputError(f"{path} cannot be read ({_why(error)}); run the same command again") from error
-        return record
+            return record
 
     def add_record(self, job_id: str, record: Mapping[str, Any], estimate: Path | None) -> None:
         """Keep the record of a job and, before it, the file of its estimate."""
@@ -191,10 +182,8 @@ class Store:
     def estimate(self, job_id: str, record: Mapping[str, Any] | None = None) -> Estimate:
         """Estimate of a job whose outcome is ``ok``; raises `InputError` where it cannot be read."""
         path = self.estimate_path(job_id)
-        try:
+        with _reading(path, AGAIN):
             return load_estimate(path, dict(record or self.record(job_id) or {}))
-        except UNREADABLE as error:
-            raise InputError(f"{path} cannot be read ({_why(error)}); run the same command again") from error
 
     @contextmanager
     def work_folder(self) -> Iterator[Path]:
@@ -272,6 +261,14 @@ def _writing(path: Path) -> Iterator[None]:
         ) from error
 
 
+@contextmanager
+def _reading(path: Path, remedy: str) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:  # a damaged file may fail in any of a dozen ways
+        raise InputError(f"{path} cannot be read ({_why(error)}); {remedy}") from error
+
+
 def _read_json(path: Path) -> dict[str, Any]:
     content = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(content, dict):
@@ -282,4 +279,4 @@ def _read_json(path: Path) -> dict[str, Any]:
 def _why(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
-    return f"{type(error).__name__}: {error}".removesuffix(": ")
+    return shown(str(error), 200).strip("'\"") if isinstance(error, InputError) else described(error, 200)

@@ -1,72 +1,30 @@
-"""A checked, resumable download, and the unpacking of the few files that are needed.
+"""The unpacking of the few files of a ``.tar.gz`` that are needed, whatever else it holds.
 
-What speaks HTTP and reads archives is imported where it is used, so that listing datasets stays quick.
+What reads archives is imported where it is used, so that listing datasets stays quick.
 """
 
 import gzip
-import hashlib
-import http
+import io
 import json
 import shutil
 import tempfile
 import zlib
 from collections.abc import Collection
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import IO, NoReturn
+from typing import IO, TYPE_CHECKING
 
-from bench.errors import InputError
+from bench.errors import InputError, shown
+
+from ._download import Archive, sha256_of
+
+if TYPE_CHECKING:
+    import tarfile
 
 _MANIFEST = "manifest.json"
 _CHUNK = 1 << 20
-_TIMEOUT = 60  # seconds without a byte
-
-
-@dataclass(frozen=True)
-class Archive:
-    """A ``.tar.gz`` on a server, with its hash and its size in bytes."""
-
-    url: str
-    sha256: str
-    size: int
-
-
-def download(archive: Archive, folder: Path, progress: bool) -> Path:
-    """Bring an archive into a folder, going on from where an earlier attempt stopped.
-
-    pooch checks a hash but starts every download anew; this one asks the server for the rest (HTTP Range).
-
-    Raises
-    ------
-    InputError
-        Where the server cannot be reached or the connection breaks (what has arrived stays in ``*.part``),
-        or where the file is not the one expected (it is kept as ``*.bad``).
-    """
-    import http.client
-    import urllib.error
-
-    path = folder / archive.url.rsplit("/", 1)[-1]
-    if path.is_file() and _sha256(path) == archive.sha256:
-        return path
-    part = path.with_name(f"{path.name}.part")
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        _receive(archive, part, progress)
-    except urllib.error.HTTPError as error:
-        error.close()
-        if error.code == http.HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE:
-            _set_aside(part, f"{archive.url}: the server holds fewer bytes than the {archive.size} expected")
-        raise InputError(f"{archive.url}: the server answers {error.code} {error.reason}") from error
-    except (OSError, http.client.HTTPException) as error:
-        why = getattr(error, "reason", error)
-        raise InputError(f"{archive.url}: {why}; {_resume(part, archive)}") from error
-    size = part.stat().st_size
-    if size < archive.size:
-        raise InputError(f"{archive.url}: the connection ended early; {_resume(part, archive)}")
-    if size > archive.size or _sha256(part) != archive.sha256:
-        _set_aside(part, f"{archive.url}: what was downloaded is not the file expected (its SHA-256 differs)")
-    part.replace(path)
-    return path
+_MOST_BYTES = 16 * 2**30  # unpacked; the official archive has some two
+_MOST_MEMBERS = 100_000
+_MOST_HEADER = 1 << 20  # bytes of a long name and the like; tarfile reads them in one piece
 
 
 def unpack(path: Path, archive: Archive, folder: Path, wanted: Collection[str], progress: bool) -> None:
@@ -77,8 +35,9 @@ def unpack(path: Path, archive: Archive, folder: Path, wanted: Collection[str], 
     Raises
     ------
     InputError
-        Where the archive is truncated or damaged, holds none of these files or one of them as a link, or
-        names any file by an absolute path or one with ``..``.
+        Where the archive is truncated or damaged, holds none of these files, one of them twice, as a link or as
+        anything else than a plain file, names any file by an absolute path or one with ``..``, or unpacks to
+        more than any such archive can need.
     """
     import tarfile
 
@@ -86,12 +45,14 @@ def unpack(path: Path, archive: Archive, folder: Path, wanted: Collection[str], 
     with tempfile.TemporaryDirectory(dir=folder, prefix=".unpacking-") as temporary:
         try:
             _extract(path, Path(temporary), wanted, progress)
-        except (tarfile.TarError, EOFError, zlib.error, gzip.BadGzipFile) as error:
+        except (tarfile.TarError, EOFError, zlib.error, gzip.BadGzipFile, ValueError, OverflowError) as error:
+            if isinstance(error, InputError):
+                raise
             raise InputError(f"{path}: the archive is truncated or damaged ({error}); fetch it again") from error
         files = sorted(Path(temporary).glob("*/*"))
         if not files:
             raise InputError(f"{path}: the archive holds none of {', '.join(wanted)}")
-        hashes = {f"{file.parent.name}/{file.name}": _sha256(file) for file in files}
+        hashes = {f"{file.parent.name}/{file.name}": sha256_of(file) for file in files}
         manifest = Path(temporary) / _MANIFEST
         manifest.write_text(json.dumps({"archive": archive.sha256, "files": hashes}, indent=1))
         for parent in sorted({file.parent for file in files}):
@@ -104,49 +65,47 @@ def damaged(folder: Path, archive: Archive) -> dict[str, str]:
     try:
         manifest = json.loads((folder / _MANIFEST).read_text())
         hashes = dict(manifest["files"]) if manifest["archive"] == archive.sha256 else None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         hashes = None
     if hashes is None:
         return {_MANIFEST: "not unpacked from this archive"}
     wrong = {}
     for name, sha256 in hashes.items():
-        if not (folder / name).is_file():
-            wrong[name] = f"{folder / name}: the file is gone"
-        elif _sha256(folder / name) != sha256:
-            wrong[name] = f"{folder / name}: the file is not as it was in the archive"
+        try:
+            same = sha256_of(folder / name) == sha256 if (folder / name).is_file() else None
+        except (OSError, ValueError):  # a name that no system has
+            same = None
+        if not same:
+            why = "gone" if same is None else "not as it was in the archive"
+            wrong[name] = f"{folder / name}: the file is {why}"
     return wrong
 
 
-def _receive(archive: Archive, part: Path, progress: bool) -> None:
-    import urllib.request
+class _Bounded(io.RawIOBase):
+    """A stream of unpacked bytes that ends with an error where there are too many, or too many are read at once."""
 
-    from tqdm import tqdm
+    def __init__(self, stream: gzip.GzipFile) -> None:
+        self.stream = stream
 
-    have = part.stat().st_size if part.is_file() else 0
-    if have >= archive.size:
-        return
-    request = urllib.request.Request(archive.url, headers={"Range": f"bytes={have}-"} if have else {})
-    with urllib.request.urlopen(request, timeout=_TIMEOUT) as response:
-        if response.status != http.HTTPStatus.PARTIAL_CONTENT:
-            have = 0  # this server does not know Range and sends it all
-        with (
-            part.open("ab" if have else "wb") as file,
-            tqdm(total=archive.size, initial=have, unit="B", unit_scale=True, disable=not progress) as bar,
-        ):
-            while have <= archive.size and (chunk := response.read(_CHUNK)):
-                have += file.write(chunk)
-                bar.update(len(chunk))
+    def read(self, size: int = -1) -> bytes:
+        if not 0 <= size <= _MOST_HEADER:
+            raise ValueError("a header claims too many bytes")
+        self._check(self.stream.tell() + size)
+        return self.stream.read(size)
 
+    def seek(self, place: int, whence: int = io.SEEK_SET) -> int:
+        self._check(place)
+        if place < self.stream.tell():
+            raise ValueError("a member lies before the one it follows")
+        return self.stream.seek(place, whence)
 
-def _resume(part: Path, archive: Archive) -> str:
-    have = part.stat().st_size if part.is_file() else 0
-    return f"{have} of {archive.size} bytes are here; the same command goes on from there"
+    def tell(self) -> int:
+        return self.stream.tell()
 
-
-def _set_aside(part: Path, why: str) -> NoReturn:
-    bad = part.with_suffix(".bad")
-    part.replace(bad)
-    raise InputError(f"{why}; it is kept as {bad}, and the same command starts anew")
+    @staticmethod
+    def _check(place: int) -> None:
+        if place > _MOST_BYTES:
+            raise ValueError(f"it unpacks to more than {_MOST_BYTES} bytes")
 
 
 def _extract(path: Path, folder: Path, wanted: Collection[str], progress: bool) -> None:
@@ -158,25 +117,35 @@ def _extract(path: Path, folder: Path, wanted: Collection[str], progress: bool) 
         path.open("rb") as file,
         tqdm(total=path.stat().st_size, desc="unpack", unit="B", unit_scale=True, disable=not progress) as bar,
         gzip.open(file) as stream,
-        tarfile.open(fileobj=stream, mode="r:") as archive,
+        tarfile.open(fileobj=_Bounded(stream), mode="r:") as archive,
     ):
-        for member in archive:
+        for count, member in enumerate(archive):
             bar.update(file.tell() - bar.n)
-            name = PurePosixPath(member.name)
-            if name.is_absolute() or ".." in name.parts or "\\" in member.name:
-                raise InputError(f"{path}: {member.name!r} lies outside the archive; nothing is unpacked")
-            if name.name not in wanted or len(name.parts) < 2:
-                continue
-            source = archive.extractfile(member) if member.isreg() else None
-            if source is None:
-                raise InputError(f"{path}: {member.name!r} is not a plain file; nothing is unpacked")
-            _copy(source, folder / name.parts[-2] / name.name)
+            if count >= _MOST_MEMBERS:
+                raise ValueError(f"it has more than {_MOST_MEMBERS} members")
+            name = _checked_name(path, member)
+            if name.name in wanted and len(name.parts) >= 2:
+                source = archive.extractfile(member) if member.isreg() and not member.issparse() else None
+                if source is None:
+                    raise InputError(f"{path}: {shown(member.name)} is not a plain file; nothing is unpacked")
+                _copy(source, folder / name.parts[-2] / name.name, path)
         while stream.read(_CHUNK):  # to the checksum at the end, which tarfile does not look at
-            pass
+            _Bounded._check(stream.tell())
 
 
-def _copy(source: IO[bytes], target: Path) -> None:
+def _checked_name(path: Path, member: "tarfile.TarInfo") -> PurePosixPath:
+    name = PurePosixPath(member.name)
+    if name.is_absolute() or ".." in name.parts or any(sign in member.name for sign in "\\:"):
+        raise InputError(f"{path}: {shown(member.name)} lies outside the archive; nothing is unpacked")
+    if member.size < 0 or not member.name.isprintable() or _MANIFEST in name.parts:
+        raise InputError(f"{path}: {shown(member.name)} is not what such an archive holds; nothing is unpacked")
+    return name
+
+
+def _copy(source: IO[bytes], target: Path, archive: Path) -> None:
     target.parent.mkdir(exist_ok=True)
+    if target.exists():
+        raise InputError(f"{archive}: '{target.parent.name}/{target.name}' is there twice; nothing is unpacked")
     with source, target.open("wb") as file:
         shutil.copyfileobj(source, file, _CHUNK)
 
@@ -188,8 +157,3 @@ def _install(source: Path, target: Path) -> None:
         return
     for file in source.iterdir():
         file.replace(target / file.name)
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

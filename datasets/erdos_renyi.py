@@ -17,6 +17,7 @@ from ._noise import Noise
 from ._statistics import statistics
 
 _ATTEMPTS = 1000
+_MOST_CAMERAS = 30_000  # every pair is drawn; this many take 7 GiB
 
 
 @dataset("erdos-renyi", title="Erdős–Rényi", cite="tejus2023")
@@ -67,8 +68,8 @@ class ErdosRenyi:
     clairvoyant: bool = False
 
     def __post_init__(self) -> None:
-        if self.n < 2:
-            raise ValueError(f"n must be at least 2, not {self.n}")
+        if not 2 <= self.n <= _MOST_CAMERAS:
+            raise ValueError(f"n must be from 2 to {_MOST_CAMERAS}, not {self.n}")
         if not 0 <= self.missing < 1:
             raise ValueError(f"missing must be at least 0 and below 1, not {self.missing}")
         Measurements.of(self)

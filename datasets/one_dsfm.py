@@ -13,7 +13,8 @@ from bench.formats.one_dsfm import BUNDLE, COMPONENT, EDGES, IMAGES, read_bundle
 from bench.problem import Floats, Instance
 from bench.registry import Missing, Source, dataset, suggestion
 
-from ._archive import Archive, damaged, download, unpack
+from ._archive import damaged, unpack
+from ._download import Archive, download
 from ._folders import cache, revision, roots
 from ._statistics import statistics
 

@@ -1,7 +1,9 @@
 """The official archive's download, against a small archive of the same layout served on loopback."""
 
+import gzip
 import hashlib
 import io
+import json
 import re
 import tarfile
 import threading
@@ -12,7 +14,8 @@ from pathlib import Path
 import pytest
 from scenes import write_scene
 
-from bench.datasets._archive import Archive
+from bench.datasets._archive import damaged
+from bench.datasets._download import Archive
 from bench.datasets.one_dsfm import FILES, OneDSfM
 from bench.errors import InputError
 
@@ -25,10 +28,16 @@ class Server(ThreadingHTTPServer):
     data = b""
     break_after: int | None = None
     knows_range = True
+    says_length = True
+    content_range: str | None = None
+    stalls_after: int | None = None
+    status = 200
 
     def __init__(self) -> None:
         super().__init__(("127.0.0.1", 0), Handler)
         self.asked: list[str | None] = []
+        self.paths: list[str] = []
+        self.end_of_stall = threading.Event()
 
     @property
     def url(self) -> str:
@@ -42,19 +51,40 @@ class Handler(BaseHTTPRequestHandler):
     server: Server
 
     def do_GET(self) -> None:
-        asked = self.headers.get("Range")
-        self.server.asked.append(asked)
-        start = int(asked[len("bytes=") : -1]) if asked and self.server.knows_range else 0
-        if start >= len(self.server.data):
-            self.send_error(416)
+        server, asked = self.server, self.headers.get("Range")
+        server.asked.append(asked)
+        server.paths.append(self.path)
+        start = int(asked[len("bytes=") : -1]) if asked and server.knows_range else 0
+        if start >= len(server.data) or server.status >= 400:
+            self.send_error(416 if start else server.status)
             return
-        self.send_response(206 if start else 200)
-        self.send_header("Content-Length", str(len(self.server.data) - start))
+        self.send_response(206 if start else server.status)
+        if server.says_length:
+            self.send_header("Content-Length", str(len(server.data) - start))
+        if start:
+            whole = f"bytes {start}-{len(server.data) - 1}/{len(server.data)}"
+            self.send_header("Content-Range", server.content_range or whole)
         self.end_headers()
-        self.wfile.write(self.server.data[start : self.server.break_after])
+        if server.stalls_after is None:
+            self.wfile.write(server.data[start : server.break_after])
+        else:
+            self.wfile.write(server.data[start : server.stalls_after])
+            server.end_of_stall.wait(10)
+
+    def do_CONNECT(self) -> None:
+        self.server.paths.append(f"CONNECT {self.path}")
+        self.send_error(503)
 
     def log_message(self, format: str, *args: object) -> None:
         pass
+
+
+@pytest.fixture(autouse=True)
+def _no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No proxy but what a test names."""
+    for name in ("http_proxy", "https_proxy", "all_proxy", "no_proxy"):
+        monkeypatch.delenv(name, raising=False)
+        monkeypatch.delenv(name.upper(), raising=False)
 
 
 @pytest.fixture
@@ -69,6 +99,7 @@ def server(tmp_path: Path) -> Iterator[Server]:
         thread = threading.Thread(target=server.serve_forever, args=(0.01,))
         thread.start()
         yield server
+        server.end_of_stall.set()
         server.shutdown()
         thread.join()
 
@@ -147,12 +178,24 @@ def test_a_wrong_checksum_is_refused_and_the_file_kept(server: Server, tmp_path:
     assert server.asked == [None, None]
 
 
-def test_a_longer_file_is_refused(server: Server, tmp_path: Path) -> None:
+@pytest.mark.parametrize("difference", [-1, 1])
+def test_another_file_in_its_place_is_refused_at_once(server: Server, tmp_path: Path, difference: int) -> None:
+    """Such as the page of a network that wants a login."""
+    other = Archive(server.url, server.archive().sha256, len(server.data) + difference)
+    message = refusal(server, tmp_path / "out", other)
+    assert f"the answer has {len(server.data)} bytes and the file has {other.size}" in message
+    assert tree(tmp_path / "out") == []
+
+
+def test_a_longer_file_of_unknown_length_is_refused(server: Server, tmp_path: Path) -> None:
+    server.says_length = False
     shorter = Archive(server.url, server.archive().sha256, len(server.data) - 1)
     assert "not the file expected" in refusal(server, tmp_path / "out", shorter)
+    assert tree(tmp_path / "out") == ["datasets.tar.gz.bad"]
 
 
 def test_a_file_that_is_shorter_on_the_server_is_given_up(server: Server, tmp_path: Path) -> None:
+    server.says_length = False
     longer = Archive(server.url, server.archive().sha256, len(server.data) + 1)
     assert "ended early" in refusal(server, tmp_path / "out", longer)
     assert "the server holds fewer bytes" in refusal(server, tmp_path / "out", longer)
@@ -224,3 +267,78 @@ def test_the_users_own_scenes_stay(server: Server, tmp_path: Path) -> None:
     (tmp_path / "out/1dsfm/Mine/list.txt").unlink()
     fetch(server, tmp_path / "out")
     assert len(server.asked) == 1
+
+
+# --- archives made to do harm ------------------------------------------------------------------------
+
+
+def headers(*members: tarfile.TarInfo, tail: bytes = b"") -> bytes:
+    """An archive of bare headers, which may claim what they like."""
+    return gzip.compress(b"".join(m.tobuf(tarfile.GNU_FORMAT) for m in members) + tail + b"\0" * 1024)
+
+
+def member(name: str, size: int = 0, kind: bytes = tarfile.REGTYPE) -> tarfile.TarInfo:
+    info = tarfile.TarInfo(name)
+    info.size, info.type = size, kind
+    return info
+
+
+@pytest.mark.parametrize("kind", [tarfile.CHRTYPE, tarfile.BLKTYPE, tarfile.DIRTYPE, tarfile.GNUTYPE_SPARSE])
+def test_a_device_a_folder_or_a_sparse_file_is_refused(server: Server, tmp_path: Path, kind: bytes) -> None:
+    server.data = headers(member(f"{INSIDE}/Evil/EGs.txt", kind=kind))
+    assert re.search("is not a plain file|truncated or damaged", refusal(server, tmp_path / "out"))
+    assert tree(tmp_path / "out") == ["datasets.tar.gz"]
+
+
+@pytest.mark.parametrize("size", [2**40, 2**62])
+def test_a_size_far_above_what_is_there_is_refused(server: Server, tmp_path: Path, size: int) -> None:
+    server.data = headers(member(f"{INSIDE}/Alamo/EGs.txt", size))
+    assert "truncated or damaged" in refusal(server, tmp_path / "out")
+    assert tree(tmp_path / "out") == ["datasets.tar.gz"]
+
+
+@pytest.mark.parametrize("kind", [tarfile.GNUTYPE_LONGNAME, tarfile.XHDTYPE, tarfile.XGLTYPE])
+def test_a_header_that_claims_gigabytes_is_not_read(server: Server, tmp_path: Path, kind: bytes) -> None:
+    server.data = headers(member("x", 2**33, kind), tail=b"\0" * 4096)
+    assert "a header claims too many bytes" in refusal(server, tmp_path / "out")
+
+
+def test_a_bomb_is_given_up(server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.datasets._archive._MOST_BYTES", 2**20)
+    for name in ("Alamo/EGs.txt", "Alamo/unwanted.txt"):
+        server.data = headers(member(f"{INSIDE}/{name}", 2**24), tail=b"\0" * 2**24)
+        assert "unpacks to more than 1048576 bytes" in refusal(server, tmp_path / "out")
+        (tmp_path / "out" / "datasets.tar.gz").unlink()
+    server.data = gzip.compress(gzip.decompress(packed(tmp_path / "scenes")) + b"\0" * 2**21)
+    assert "unpacks to more than 1048576 bytes" in refusal(server, tmp_path / "out")
+
+
+def test_a_million_members_are_given_up(server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.datasets._archive._MOST_MEMBERS", 10)
+    server.data = headers(*(member(f"x/{k}") for k in range(12)))
+    assert "more than 10 members" in refusal(server, tmp_path / "out")
+
+
+def test_a_member_that_is_there_twice_is_refused(server: Server, tmp_path: Path) -> None:
+    server.data = packed(tmp_path / "scenes", member(f"{INSIDE}/Alamo/EGs.txt", 3))
+    assert "'Alamo/EGs.txt' is there twice" in refusal(server, tmp_path / "out")
+    assert tree(tmp_path / "out") == ["datasets.tar.gz"]
+
+
+@pytest.mark.parametrize("name", ["a\nb/EGs.txt", "C:/x/EGs.txt", "x/manifest.json/EGs.txt", "\udcff/EGs.txt"])
+def test_a_name_that_no_system_should_be_given_is_refused(server: Server, tmp_path: Path, name: str) -> None:
+    server.data = headers(member(name))
+    assert "nothing is unpacked" in refusal(server, tmp_path / "out")
+    assert tree(tmp_path / "out") == ["datasets.tar.gz"]
+
+
+def test_a_manifest_of_anything_is_not_believed(server: Server, tmp_path: Path) -> None:
+    scenes = fetch(server, tmp_path / "out")
+    archive = server.archive()
+    assert damaged(scenes, archive) == {}
+    (scenes / "manifest.json").write_text(
+        json.dumps({"archive": archive.sha256, "files": {"/dev/zero": "0", "a\0b": "0"}})
+    )
+    assert list(damaged(scenes, archive)) == ["/dev/zero", "a\0b"]
+    (scenes / "manifest.json").write_text("[" * 100_000)
+    assert list(damaged(scenes, archive)) == ["manifest.json"]

@@ -312,7 +312,8 @@ def test_a_layout_that_is_not_one_says_where(layout_file: Path, old: str, new: s
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("2.3", "2,3x", "t.csv:3: '3x' in column 'Theirs' is not a number"),
+        ("2.3", "3x", "t.csv:3: '3x' in column 'Ours' is not a number"),
+        ("2.3", "2,3", "t.csv:3: 8 cells where there are 7 columns"),
         (",source", ",sauce", "has no column 'source'"),
         ("Theirs", "Others", "no entry for column 'Others'"),
         ("Alamo", "Alamos", "no entry for 'Alamos'"),

@@ -3,7 +3,7 @@
 import contextlib
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bench.errors import InputError
@@ -62,6 +62,7 @@ words = st.text(st.characters(codec="ascii", exclude_characters="\"'", categorie
 values = st.one_of(st.booleans(), st.none(), st.integers(), st.floats(allow_nan=False), words)
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.dictionaries(st.from_regex(r"[a-z_]+", fullmatch=True), values))
 def test_what_is_written_reads_back(parameters: dict[str, object]) -> None:
     (combination,) = parse(format_selection("method", parameters)).combinations()
@@ -69,6 +70,7 @@ def test_what_is_written_reads_back(parameters: dict[str, object]) -> None:
     assert [type(v) for v in combination.values()] == [type(v) for v in parameters.values()]
 
 
+@settings(deadline=None)
 @given(st.text(alphabet="ab[]=,'\" 1.-"))
 def test_any_text_parses_or_is_refused(text: str) -> None:
     with contextlib.suppress(InputError):

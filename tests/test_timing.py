@@ -10,8 +10,9 @@ import pytest
 from bench.arrays import load_problem, save_estimate
 from bench.errors import InputError
 from bench.execution import outcome, timing
-from bench.execution.child import ESTIMATE_FILE, Request
+from bench.execution.child import Request
 from bench.execution.outcome import Outcome
+from bench.execution.output import ESTIMATE_FILE
 from bench.experiment import load_suite, suite_names
 from bench.problem import Estimate
 from bench.reporting import tables

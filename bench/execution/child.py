@@ -24,14 +24,15 @@ import numpy as np
 
 from bench import registry
 from bench.arrays import load_problem, save_estimate
+from bench.errors import described
 from bench.execution import outcome
 from bench.execution.outcome import Outcome
+from bench.execution.output import ESTIMATE_FILE, RESULT_FILE
 from bench.execution.threads import pin_threads
-from bench.problem import ROTATION_TOLERANCE, Estimate, Floats, Problem, Skipped
+from bench.execution.validate import kept_warnings, scalars, what_is_wrong
+from bench.problem import Estimate, Floats, Problem, Skipped
 from bench.seeds import stream
 
-ESTIMATE_FILE = "estimate.npz"
-RESULT_FILE = "result.json"
 MANY = 10  # times repeat_s; a solution that takes longer is timed as it is, the first time
 
 
@@ -107,14 +108,14 @@ def run(request: Request, prepared: Prepared | None = None) -> None:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             ended = solve(request, prepared or prepare(request), result)
-        result["warnings"] = sorted({f"{w.category.__name__}: {w.message}" for w in caught})
+        result["warnings"] = kept_warnings(caught)
     except Skipped as skip:
         ended = Outcome(outcome.SKIPPED, str(skip))
     except MemoryError as error:
         ended = Outcome(outcome.OUT_OF_MEMORY, str(error))
     except Exception as error:
         traceback.print_exc()
-        ended = Outcome(outcome.ERROR, f"{type(error).__name__}: {error}")
+        ended = Outcome(outcome.ERROR, described(error))
     result |= {"kind": ended.kind, "detail": ended.detail}
     temporary = Path(request.folder, RESULT_FILE + ".part")
     temporary.write_text(json.dumps(result), encoding="utf-8")
@@ -146,10 +147,11 @@ def solve(request: Request, prepared: Prepared, result: dict[str, Any]) -> Outco
         os._exit(0)  # the method forked, and did not keep the other from returning here
     processor = time.process_time() - processor
     result["peak_mib"] = memory.peak_mib()
-    result |= {"solve_s": elapsed - estimate.conversion_s, "conversion_s": estimate.conversion_s}
-    wrong = _what_is_wrong(solved, estimate, elapsed)
+    result["solve_s"] = elapsed
+    wrong = what_is_wrong(pristine, estimate, elapsed)
     if wrong:
         return Outcome(outcome.INVALID_OUTPUT, wrong)
+    result |= {"solve_s": elapsed - float(estimate.conversion_s), "conversion_s": float(estimate.conversion_s)}
     if not connected:
         estimate = _lifted(estimate, problem, cameras, kept)
     if request.repeat_s:
@@ -157,7 +159,7 @@ def solve(request: Request, prepared: Prepared, result: dict[str, Any]) -> Outco
         if elapsed < MANY * request.repeat_s:
             solves_s, waited = _repeated(method, pristine, request, info.name)
         result |= {"solves_s": solves_s, "waited": max(0.0, waited)}
-    result |= _scalars(estimate)
+    result |= scalars(estimate)
     save_estimate(Path(request.folder, ESTIMATE_FILE), estimate)
     return Outcome(outcome.OK)
 
@@ -187,31 +189,6 @@ def _repeated(method: Any, problem: Problem, request: Request, name: str) -> tup
     return solves_s, 1 - processor / total
 
 
-def _what_is_wrong(problem: Problem, estimate: Estimate, elapsed: float) -> str:
-    """Say why the estimate cannot be scored, or nothing."""
-    rotations = estimate.rotations
-    if not isinstance(rotations, np.ndarray) or rotations.shape != (problem.n, 3, 3):
-        shape = getattr(rotations, "shape", type(rotations).__name__)
-        return f"rotations must be an array of shape ({problem.n}, 3, 3), not {shape}"
-    if not np.issubdtype(rotations.dtype, np.floating):
-        return f"rotations must be floating point, not {rotations.dtype}"
-    missing = np.isnan(rotations).all(axis=(1, 2))
-    if missing.all():
-        return "no camera was solved"
-    solved = rotations[~missing].astype(float)
-    if not np.isfinite(solved).all():
-        return f"{(~np.isfinite(solved).all(axis=(1, 2))).sum()} cameras have entries that are not finite"
-    off = np.linalg.norm(solved @ solved.transpose(0, 2, 1) - np.eye(3), axis=(1, 2))
-    bad = (off > ROTATION_TOLERANCE) | (np.linalg.det(solved) < 0)
-    if bad.any():
-        return f"{bad.sum()} of {len(solved)} matrices are not rotations to {ROTATION_TOLERANCE:g}"
-    if estimate.edge_weights is not None and np.shape(estimate.edge_weights) != (problem.m,):
-        return f"edge_weights must have shape ({problem.m},), not {np.shape(estimate.edge_weights)}"
-    if not 0 <= estimate.conversion_s <= elapsed:
-        return f"conversion_s is {estimate.conversion_s:g} s, which is not within the time that solve took"
-    return ""
-
-
 def _lifted(estimate: Estimate, problem: Problem, cameras: Any, kept: Any) -> Estimate:
     """Put an estimate of the largest component into the whole graph, NaN elsewhere."""
 
@@ -231,20 +208,6 @@ def _lifted(estimate: Estimate, problem: Problem, cameras: Any, kept: Any) -> Es
         ),
         notes=(*estimate.notes, note),
     )
-
-
-def _scalars(estimate: Estimate) -> dict[str, Any]:
-    return {
-        "iterations": None if estimate.iterations is None else int(estimate.iterations),
-        "stop_reason": estimate.stop_reason,
-        "cost": None if estimate.cost is None else float(estimate.cost),
-        "certificate": None if estimate.certificate is None else float(estimate.certificate),
-        "notes": list(estimate.notes),
-        "checkpoints": [
-            {"iteration": c.iteration, "seconds": c.seconds, "diagnostics": dict(c.diagnostics)}
-            for c in estimate.checkpoints
-        ],
-    }
 
 
 def _pin_core(core: int | None) -> int | None:

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from bench.execution import outcome
-from bench.execution.child import ESTIMATE_FILE, Request
+from bench.execution.child import Request
 from bench.execution.folders import WorkFolders
 from bench.execution.job import execute, record_of
 from bench.execution.launch import Launcher
 from bench.execution.outcome import Outcome
+from bench.execution.output import ESTIMATE_FILE
 from bench.execution.supervise import Interrupted, Limits
 from bench.experiment import Cell
 from bench.plan import Job

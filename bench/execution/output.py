@@ -8,11 +8,25 @@ from typing import Any
 import numpy as np
 
 from bench.execution import outcome
-from bench.execution.child import ESTIMATE_FILE, RESULT_FILE
 from bench.execution.outcome import Outcome
 
+ESTIMATE_FILE = "estimate.npz"
+RESULT_FILE = "result.json"
 LARGEST_RESULT = 2**24  # bytes; the scalars of a few hundred thousand checkpoints fit into it
 OF_CHILDREN = (outcome.OK, outcome.SKIPPED, outcome.ERROR, outcome.OUT_OF_MEMORY, outcome.INVALID_OUTPUT)
+
+
+OF_THE_HARNESS = {"job", "outcome", "status", "finished", "limits", "versions", "provenance", "schema"}
+REQUIRED = {"solve_s", "peak_mib", "checkpoints"}
+_NUMBER, _NOTHING = (int, float), type(None)
+TYPES: dict[str, tuple[type, ...]] = {
+    **dict.fromkeys(("solve_s", "conversion_s", "peak_mib", "waited"), _NUMBER),
+    **dict.fromkeys(("cost", "certificate"), (*_NUMBER, _NOTHING)),
+    **dict.fromkeys(("core", "iterations"), (int, _NOTHING)),
+    **dict.fromkeys(("notes", "warnings", "checkpoints", "solves_s"), (list,)),
+    "threads": (int,),
+    "stop_reason": (str,),
+}
 
 
 class UnusableError(ValueError):
@@ -49,12 +63,24 @@ def _result(path: Path) -> tuple[Outcome, dict[str, Any]]:
     if not isinstance(detail := report.pop("detail", None), str):
         raise UnusableError(f"{path.name} tells no reason of its outcome")
     ended = Outcome(report.pop("kind"), detail)
-    if ended.kind == outcome.OK:
-        if not isinstance(report.get("solve_s"), float) or not isinstance(report.get("peak_mib"), float):
-            raise UnusableError(f"{path.name} tells no time or memory")
-        if not isinstance(report.get("checkpoints"), list):
-            raise UnusableError(f"{path.name} tells no checkpoints")
+    if forged := OF_THE_HARNESS & report.keys():
+        raise UnusableError(f"{path.name} tells '{min(forged)}', which is not for a child to tell")
+    missing = REQUIRED - report.keys() if ended.kind == outcome.OK else ()
+    if missing:
+        raise UnusableError(f"{path.name} does not tell {' and '.join(sorted(missing))}")
+    for name in report.keys() & TYPES.keys():
+        if not isinstance(report[name], TYPES[name]) or isinstance(report[name], bool):
+            raise UnusableError(f"{path.name}: '{name}' is a {type(report[name]).__name__}")
+    _check_lists(path, report)
     return ended, report
+
+
+def _check_lists(path: Path, report: dict[str, Any]) -> None:
+    if not all(isinstance(text, str) for name in ("notes", "warnings") for text in report.get(name, ())):
+        raise UnusableError(f"{path.name}: notes and warnings are sentences")
+    for checkpoint in report.get("checkpoints", ()):
+        if not isinstance(checkpoint, dict) or checkpoint.keys() != {"iteration", "seconds", "diagnostics"}:
+            raise UnusableError(f"{path.name}: a checkpoint is not one")
 
 
 def _check_estimate(path: Path, checkpoints: int) -> None:

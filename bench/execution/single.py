@@ -9,10 +9,11 @@ from typing import Any, Self
 
 from bench.arrays import load_estimate, save_problem
 from bench.execution import outcome
-from bench.execution.child import ESTIMATE_FILE, Request
+from bench.execution.child import Request
 from bench.execution.job import execute
 from bench.execution.launch import Launcher
 from bench.execution.outcome import Outcome
+from bench.execution.output import ESTIMATE_FILE
 from bench.execution.supervise import Limits
 from bench.problem import Estimate, Problem
 from bench.registry import Info

@@ -11,11 +11,11 @@ from statistics import median
 from typing import Any
 
 from bench.execution import outcome
-from bench.execution.child import ESTIMATE_FILE
 from bench.execution.job import execute, record_of
 from bench.execution.launch import Launcher
 from bench.execution.local import Finished, not_installed, request_of
 from bench.execution.outcome import Outcome
+from bench.execution.output import ESTIMATE_FILE
 from bench.execution.supervise import Limits
 from bench.experiment import Cell
 from bench.store import Store

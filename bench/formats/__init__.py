@@ -32,9 +32,13 @@ def read_graph(path: str | Path) -> GraphFile:
         Where there is no such file, or naming the file and the line that cannot be used.
     """
     path = Path(path)
-    if path.is_dir():
+    try:
+        exists, is_folder = path.exists(), path.is_dir()
+    except OSError as error:  # such as a name that is too long
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    if is_folder:
         return read_folder(path)
-    if not path.exists():
+    if not exists:
         raise InputError(f"{path}: there is no such file or folder")
     suffix = path.suffix.lower()
     if suffix == ".npz":

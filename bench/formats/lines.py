@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import InputError
+from bench.errors import InputError, shown
 
 Row = tuple[int, list[str]]
 
@@ -41,15 +41,20 @@ class Table:
 
 def read_bytes(path: Path) -> bytes:
     """All bytes of a file; `InputError` where it is not there, cannot be read or is empty."""
+    check_plain(path)
     try:
         data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     if not data.strip():
         raise InputError(f"{path}: the file is empty")
     return data
+
+
+def check_plain(path: Path) -> None:
+    """Refuse what is no plain file: a pipe or a device, to which a link may lead, may never end."""
+    if not path.is_file():
+        raise InputError(f"{path}: {'it is not a plain file' if path.exists() else 'there is no such file'}")
 
 
 def decode(path: Path, data: bytes) -> str:
@@ -91,11 +96,15 @@ def parse(path: Path, source: Iterable[Row], ids: int, numbers: int, layout: str
         if len(words) != width:
             raise InputError(f"{path}:{line}: {len(words)} values where there must be {width}: {layout}")
         try:
+            if "_" in "".join(words):  # Python reads 1_000 as a number, no file means it so
+                raise ValueError
             integers.extend(map(int, words[:ids]))
             floats.extend(map(float, words[ids:]))
         except (ValueError, OverflowError):
             raise InputError(f"{path}:{line}: {_culprit(words, ids)}; a line holds {layout}") from None
         lines.append(line)
+    if not lines:
+        raise InputError(f"{path}: there is no line in it; a line holds {layout}")
     return Table(
         path,
         np.array(lines, dtype=np.int64),
@@ -104,14 +113,11 @@ def parse(path: Path, source: Iterable[Row], ids: int, numbers: int, layout: str
     )
 
 
-def shown(word: str) -> str:
-    """A word of a file as it may stand in a message, whatever it holds."""
-    return repr(word if len(word) <= 24 else f"{word[:24]}...")
-
-
 def _culprit(words: list[str], ids: int) -> str:
     for k, word in enumerate(words):
         try:
+            if "_" in word:
+                raise ValueError
             if k < ids:
                 array("q", [int(word)])
             else:

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench import npz
 from bench.errors import InputError
 from bench.formats.graph import GraphFile, Ids, build, check_pairs, first
-from bench.problem import Ints
-
-_MOST_CAMERAS = 10_000_000  # so that a damaged number does not take all memory
+from bench.problem import MOST_CAMERAS, Ints
 
 
 def read_npz(path: Path) -> GraphFile:
@@ -56,13 +55,7 @@ def read_topology(path: Path) -> tuple[int, Ints]:
 
 def _load(path: Path, required: Mapping[str, str], optional: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
     """Arrays of an archive; `required` says which shape each that must be there has."""
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in (*required, *optional) if name in archive}
-    except Exception as error:  # a damaged zip or header may fail in any of a dozen ways
-        raise InputError(
-            f"{path}: cannot be read as a NumPy archive of plain arrays; write it with numpy.savez"
-        ) from error
+    arrays = npz.load(path, (*required, *optional))
     for name, shape in required.items():
         if name not in arrays:
             raise InputError(f"{path}: there is no array '{name}' in it; it must hold one of shape {shape}")
@@ -95,8 +88,8 @@ def _weights(path: Path, array: NDArray[Any], m: int) -> NDArray[np.float64]:
 
 def _cameras(path: Path, array: NDArray[Any], edges: Ids) -> Ids:
     n = int(_checked(path, "n", array, "iu", ()))
-    if not 0 < n <= _MOST_CAMERAS:
-        raise InputError(f"{path}: 'n' is {n}, but must be from 1 to {_MOST_CAMERAS}")
+    if not 0 < n <= MOST_CAMERAS:
+        raise InputError(f"{path}: 'n' is {n}, but must be from 1 to {MOST_CAMERAS}")
     if (row := first((edges >= n).any(axis=1))) is not None:
         raise InputError(f"{path}: row {row}: camera {edges[row].max()} is outside the graph; 'n' is {n}")
     return np.arange(n, dtype=np.int64)

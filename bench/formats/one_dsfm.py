@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.errors import InputError
+from bench.errors import InputError, shown
 from bench.formats.graph import GraphFile, Ids, build, checked_rotations, distinct, first
-from bench.formats.lines import Table, decode, parse, read_bytes, rows, shown
+from bench.formats.lines import Table, check_plain, decode, parse, read_bytes, rows
 from bench.problem import Floats
 
 EDGES, COMPONENT, IMAGES, BUNDLE = "EGs.txt", "cc.txt", "list.txt", "gt_bundle.out"
@@ -135,6 +135,7 @@ def _bundle_size(path: Path) -> int:
 
 def _head(path: Path, count: int) -> list[str]:
     """The first `count` lines, or fewer where the file ends, so that a bundle's points are never read."""
+    check_plain(path)
     try:
         with path.open("rb") as file:
             data = b"".join(islice(file, count))

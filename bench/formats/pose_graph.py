@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bench import so3
-from bench.errors import InputError
+from bench.errors import InputError, shown
 from bench.formats.graph import PRECISION, GraphFile, Ids, build, distinct, first
-from bench.formats.lines import Row, Table, parse, rows, shown
+from bench.formats.lines import Row, Table, parse, rows
 from bench.problem import Floats
 
 _INFORMATION = 21  # upper triangle of a 6 x 6 matrix
@@ -76,6 +76,8 @@ def read_pose_graph(path: Path) -> GraphFile:
 
 def is_pose_graph(path: Path) -> bool:
     """Whether a text file begins as a pose graph does; False where it cannot be read."""
+    if not path.is_file():
+        return False
     try:
         with path.open("rb") as file:
             return file.read(64).lstrip().startswith((b"VERTEX", b"EDGE"))

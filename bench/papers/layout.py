@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bench import named
-from bench.errors import InputError
+from bench.errors import InputError, shown
 from bench.papers.claims import Claims
 from bench.papers.curves import CurvePlot
 from bench.papers.properties import PropertyTable
@@ -88,36 +88,36 @@ def _parsed(name: str, where: str, content: dict[str, Any], folder: Traversable,
     head = {key: content.pop(key, "") for key in ("title", "cite")}
     for key, value in head.items():
         if not isinstance(value, str):
-            raise InputError(f"{where}: '{key}' must be a str, not {value!r}")
-    items = {key: _item(f"{where}: {key}", value) for key, value in content.items()}
+            raise InputError(f"{where}: '{key}' must be a str, not {shown(value)}")
+    items = {key: _item(f"{where}: {_brief(key)}", value) for key, value in content.items()}
     return Layout(name, head["title"] or name, head["cite"], items, folder, reference)
 
 
 def _item(where: str, content: Any) -> Item:
     if not isinstance(content, dict):
-        raise InputError(f"{where} must be a table such as [table1], not {content!r}")
+        raise InputError(f"{where} must be a table such as [table1], not {shown(content)}")
     kind = content.pop("kind", None)
-    if kind not in KINDS:
-        raise InputError(f"{where}.kind must be one of {', '.join(KINDS)}, not {kind!r}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError(f"{where}.kind must be one of {', '.join(KINDS)}, not {shown(kind)}")
     item = _made(KINDS[kind], content, where)
     if not isinstance(item, PropertyTable) and item.alignment not in RULES:
-        raise InputError(f"{where}.alignment is '{item.alignment}'{suggestion(item.alignment, RULES)}")
+        raise InputError(f"{where}.alignment is {shown(item.alignment)}{suggestion(item.alignment, RULES)}")
     return item
 
 
 def _made(cls: Any, content: Any, where: str) -> Any:
     """An instance of a dataclass, from the keys and values of a TOML table."""
     if not isinstance(content, dict):
-        raise InputError(f"{where} must be a table, not {content!r}")
+        raise InputError(f"{where} must be a table, not {shown(content)}")
     fields = {f.name: f for f in dataclasses.fields(cls)}
     hints = typing.get_type_hints(cls)
     for key in content:
         if key not in fields:
-            raise InputError(f"{where}: unknown key '{key}'{suggestion(key, fields)}")
+            raise InputError(f"{where}: unknown key {shown(key)}{suggestion(key, fields)}")
     for key, f in fields.items():
         if key not in content and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING:
             raise InputError(f"{where}: key '{key}' is missing")
-    values = {key: _value(hints[key], value, f"{where}.{key}") for key, value in content.items()}
+    values = {key: _value(hints[key], value, f"{where}.{_brief(key)}") for key, value in content.items()}
     try:
         return cls(**values)
     except ValueError as error:
@@ -132,7 +132,7 @@ def _value(hint: Any, value: Any, where: str) -> Any:
     if origin is tuple and isinstance(value, list):
         return tuple(_value(arguments[0], entry, where) for entry in value)
     if origin is Mapping and isinstance(value, dict):
-        return {key: _value(arguments[1], entry, f"{where}.{key}") for key, entry in value.items()}
+        return {key: _value(arguments[1], entry, f"{where}.{_brief(key)}") for key, entry in value.items()}
     if origin is typing.Literal:
         fits, wanted = value in arguments, " or ".join(map(repr, arguments))
     else:
@@ -141,5 +141,9 @@ def _value(hint: Any, value: Any, where: str) -> Any:
         fits = hint is Any or (isinstance(value, union) and (hint is bool or not isinstance(value, bool)))
         wanted = f"a {getattr(union, '__name__', union)}"
     if not fits:
-        raise InputError(f"{where} must be {wanted}, not {value!r}")
+        raise InputError(f"{where} must be {wanted}, not {shown(value)}")
     return value
+
+
+def _brief(key: str) -> str:
+    return key if key.isprintable() and len(key) <= 80 else shown(key)

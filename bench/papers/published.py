@@ -2,9 +2,10 @@
 
 import csv
 import io
+import math
 from importlib.resources.abc import Traversable
 
-from bench.errors import InputError
+from bench.errors import InputError, shown
 
 SCENE = "scene"
 FACTS = ("n_cameras", "edges_percent", "hardness")  # what a table prints of a scene, by the names that we score
@@ -22,20 +23,34 @@ def read_published(folder: Traversable, name: str) -> list[dict[str, str]]:
     Raises
     ------
     InputError
-        Where the file is missing, a column is, or a cell is not a number.
+        Where the file is missing or not CSV, a column is missing or there twice, a row has fewer or more cells than
+        there are columns, or a cell is not a number.
     """
     path = folder / name
     if not path.is_file():
         raise InputError(f"there is no file {path} with the published numbers")
-    reader = csv.DictReader(io.StringIO(path.read_text(encoding="utf-8")))
+    try:
+        return _checked_rows(str(path), io.StringIO(path.read_text(encoding="utf-8")))
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is not a CSV file: {error}") from error
+
+
+def _checked_rows(path: str, text: io.StringIO) -> list[dict[str, str]]:
+    reader = csv.reader(text)
+    columns = next(reader, [])
     for column in (SCENE, *FACTS, SOURCE):
-        if column not in (reader.fieldnames or ()):
+        if column not in columns:
             raise InputError(f"{path} has no column '{column}'")
+    if len(set(columns)) < len(columns):
+        raise InputError(f"{path}:1: two columns have the same name")
     rows = []
-    for row in reader:
-        for column, text in row.items():
-            if column not in (SCENE, SOURCE) and text and not _is_number(text):
-                raise InputError(f"{path}:{reader.line_num}: '{text}' in column '{column}' is not a number")
+    for cells in filter(None, reader):
+        if len(cells) != len(columns):
+            raise InputError(f"{path}:{reader.line_num}: {len(cells)} cells where there are {len(columns)} columns")
+        row = dict(zip(columns, cells, strict=True))
+        for column, cell in row.items():
+            if column not in (SCENE, SOURCE) and cell and not _is_number(cell):
+                raise InputError(f"{path}:{reader.line_num}: {shown(cell)} in column {shown(column)} is not a number")
         rows.append(row)
     return rows
 
@@ -47,7 +62,6 @@ def methods_of(rows: list[dict[str, str]]) -> list[str]:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        return math.isfinite(float(text)) and "_" not in text
     except ValueError:
         return False
-    return True
