@@ -1,4 +1,4 @@
-"""Score one job: the row of its estimate, and the errors of its cameras."""
+"""The row of one job: what was measured, and how good its estimate is."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 from bench.execution import outcome
 from bench.problem import Estimate, Floats, Instance
-from bench.scoring.errors import camera_errors, edge_metrics, summary
+from bench.scoring.errors import edge_metrics, summary
 from bench.scoring.roc import roc_auc
 
 MEASURED = ("solve_s", "peak_mib", "conversion_s")
@@ -16,9 +16,7 @@ OF_INSTANCE = ("edges_percent", "hardness")
 NOT_RUN = {"outcome": outcome.NOT_RUN, "status": outcome.NOT_RUN}
 
 
-def scored(
-    instance: Instance, record: Mapping[str, Any], estimate: Estimate | None, rule: str
-) -> tuple[dict[str, Any], Floats]:
+def scored(instance: Instance, record: Mapping[str, Any], estimate: Estimate | None, errors: Floats) -> dict[str, Any]:
     """Everything that a table knows of a job, as long as its record stays as it is.
 
     Parameters
@@ -27,15 +25,10 @@ def scored(
         Of the job; `NOT_RUN` where there is no record.
     estimate
         None unless the outcome is ``ok``.
-    rule
-        One of `bench.scoring.alignment.RULES`.
-
-    Returns
-    -------
-    The row, and the errors (n,) in degrees, NaN where not scored; empty where there is no truth.
+    errors
+        Of its cameras, in degrees; none where there is no truth.
     """
     problem, truth = instance.problem, instance.truth
-    errors = np.full(problem.n, np.nan)
     scores: dict[str, Any] = {"n_solved": 0, "roc_auc": np.nan}
     if estimate is not None:
         rotations = estimate.rotations
@@ -43,9 +36,7 @@ def scored(
         scores |= edge_metrics(problem, rotations, truth)
         if estimate.edge_weights is not None and instance.outliers is not None:
             scores["roc_auc"] = roc_auc(estimate.edge_weights, instance.outliers)
-        if truth is not None:
-            errors = camera_errors(rotations, truth, rule)
-    row = {
+    return {
         "protocol": instance.protocol,
         "status": record["status"],
         **summary(errors),
@@ -62,5 +53,5 @@ def scored(
         "has_truth": truth is not None,
         "n_checkpoints": len(record.get("checkpoints", ())) if estimate is not None else 0,
         "instance_notes": list(instance.notes),
+        "errors": errors,
     }
-    return row, errors if truth is not None else np.empty(0)

@@ -9,7 +9,7 @@ import contextlib
 import hashlib
 import os
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -24,11 +24,13 @@ import bench
 from bench.errors import InputError
 from bench.execution import outcome
 from bench.plan import Job
-from bench.problem import Floats
+from bench.problem import Estimate, Floats, Instance
 from bench.scored import NOT_RUN, scored
-from bench.store import Store
+from bench.scoring.errors import all_camera_errors
+from bench.store import AGAIN, Store
 
-BATCH = 20_000
+BATCH = 20_000  # rows of a file
+TOGETHER = 100  # estimates in memory
 INSTANCES = 8  # kept in memory; jobs come instance by instance
 SOURCES = (
     "so3.py",
@@ -57,6 +59,8 @@ SCHEMA = pa.schema(
     + [("has_truth", pa.bool_()), ("round_s", pa.list_(pa.float64())), ("instance_notes", pa.list_(pa.string()))]
 )
 ERRORS = pa.field("errors", pa.list_(pa.float64()))
+
+_Read = tuple[tuple[Job, int], Instance, Mapping[str, Any], Estimate | None]
 
 
 @dataclass(frozen=True)
@@ -106,27 +110,22 @@ def scores_of(store: Store, jobs: Sequence[Job], rule: str) -> Scores:
     stamps = np.array([_stamp(store, job.id) for job in jobs], dtype=np.int64)
     found = _located(parts, ids, stamps)
     scorer = _Scorer(store, rule)
-    unreadable = {}
     todo = np.flatnonzero((found < 0) & (stamps >= 0)).tolist()
     for start in range(0, len(todo), BATCH):
-        rows = {}
-        for k in todo[start : start + BATCH]:
-            try:
-                rows[k] = scorer.row(jobs[k], int(stamps[k]))
-            except InputError as error:
-                unreadable[k] = str(error)
+        rows = scorer.rows([(jobs[k], int(stamps[k])) for k in todo[start : start + BATCH]])
         if rows:
-            parts.append(_kept(_tabulated(list(rows.values())), folder))
-    stamps[list(unreadable)] = -1
-    absent = [scorer.row(jobs[k], -1) for k in np.flatnonzero(stamps < 0).tolist()]
+            parts.append(_kept(_tabulated(rows), folder))
+    if scorer.unreadable:
+        stamps[[job.id in scorer.unreadable for job in jobs]] = -1
+    absent = [(jobs[k], -1) for k in np.flatnonzero(stamps < 0).tolist()]
     if absent:
-        parts.append(_Part(_tabulated(absent)))
-    if scorer.used:
+        parts.append(_Part(_tabulated(scorer.rows(absent))))
+    if todo or absent:
         found = _located(parts, ids, stamps)
     table = pa.concat_tables([part.table for part in parts] or [SCHEMA.empty_table()])
     if not np.array_equal(found, np.arange(table.num_rows)):
         table = table.take(pa.array(found))
-    return Scores(table, tuple(unreadable.values()), tuple(parts), found)
+    return Scores(table, tuple(scorer.unreadable.values()), tuple(parts), found)
 
 
 class _Scorer:
@@ -134,21 +133,41 @@ class _Scorer:
         self.store = store
         self.rule = rule
         self.instance = lru_cache(INSTANCES)(store.instance)
-        self.used = False
+        self.unreadable: dict[str, str] = {}
 
-    def row(self, job: Job, stamp: int) -> dict[str, Any]:
-        """Score a job, or say that it has no record; raises `InputError` where its record cannot be read."""
-        self.used = True
-        record = (self.store.record(job.id) if stamp >= 0 else None) or NOT_RUN
-        estimate = self.store.estimate(job.id, record) if record["outcome"] == outcome.OK else None
-        instance = self.instance(job.instance_key)
+    def rows(self, jobs: Sequence[tuple[Job, int]]) -> list[dict[str, Any]]:
+        """Score jobs, each with the stamp of its record; those whose record cannot be read are left out and told."""
+        return [row for k in range(0, len(jobs), TOGETHER) for row in self._rows(jobs[k : k + TOGETHER])]
+
+    def _rows(self, jobs: Sequence[tuple[Job, int]]) -> Iterator[dict[str, Any]]:
+        read = [found for job, stamp in jobs if (found := self._read(job, stamp))]
+        solved = [(estimate.rotations, i.truth) for _, i, _, estimate in read if estimate and i.truth is not None]
+        errors = iter(all_camera_errors(solved, self.rule))
+        for (job, stamp), instance, record, estimate in read:
+            of_job = np.full(instance.problem.n, np.nan) if instance.truth is not None else np.empty(0)
+            if estimate is not None and instance.truth is not None:
+                of_job = next(errors)
+            try:
+                row = scored(instance, record, estimate, of_job)
+                yield {**row, "job": job.id, "stamp": stamp, **_typed(row)}
+            except (TypeError, ValueError, KeyError, AttributeError) as error:
+                self._tell(job, f"{self.store.record_path(job.id)} cannot be read ({error}); {AGAIN}")
+
+    def _read(self, job: Job, stamp: int) -> _Read | None:
         try:
-            row, errors = scored(instance, record, estimate, self.rule)
-            return {"job": job.id, "stamp": stamp, "errors": errors, **_typed(row)}
-        except (TypeError, ValueError, KeyError, IndexError) as error:
-            raise InputError(
-                f"{self.store.record_path(job.id)} does not fit its instance ({error}); run the same command again"
-            ) from error
+            record = (self.store.record(job.id) if stamp >= 0 else None) or NOT_RUN
+            estimate = self.store.estimate(job.id, record) if record["outcome"] == outcome.OK else None
+        except InputError as error:
+            self._tell(job, str(error))
+            return None
+        instance = self.instance(job.instance_key)
+        if estimate is not None and len(estimate.rotations) != instance.problem.n:
+            self._tell(job, f"{self.store.estimate_path(job.id)} does not fit its instance; {AGAIN}")
+            return None
+        return (job, stamp), instance, record, estimate
+
+    def _tell(self, job: Job, sentence: str) -> None:
+        self.unreadable[job.id] = sentence
 
 
 @cache

@@ -142,53 +142,65 @@ def karcher_mean(r: Array) -> Array:
 
 
 def geodesic_median(r: Array) -> Array:
-    """Rotation (3, 3) that minimises the sum of geodesic distances to r (k, 3, 3).
+    """Rotations (..., 3, 3) that minimise the sum of geodesic distances to r (..., k, 3, 3).
 
     Weiszfeld's iteration on the tangent space (Hartley, Aftab and Trumpf 2011), with the step of Vardi and
     Zhang (2000) where the iterate meets a member: there the plain step is 0/0, and stops whether or not the
     member is the median. The problem is not convex: the start is the cheapest of the geometric median in R^9
     (a convex problem), projected, and up to `MEDIAN_STARTS` evenly spaced members. Nothing depends on the
-    frame.
+    frame. Many sets of the same size are solved together, each as it would be alone.
     """
-    members = r[np.unique(np.linspace(0, len(r) - 1, MEDIAN_STARTS).astype(int))]
-    starts = np.concatenate([project(_geometric_median(r))[None], members])
-    median = to_quaternion(starts[np.argmin(angle_between(starts[:, None], r).sum(axis=1))])
-    q = to_quaternion(r)
+    sets = r.reshape(-1, *r.shape[-3:])
+    members = sets[:, np.unique(np.linspace(0, sets.shape[1] - 1, MEDIAN_STARTS).astype(int))]
+    starts = np.concatenate([project(_geometric_median(sets))[:, None], members], axis=1)
+    costs = angle_between(starts[:, :, None], sets[:, None]).sum(axis=2)
+    median = to_quaternion(starts[np.arange(len(sets)), np.argmin(costs, axis=1)])
+    q = to_quaternion(sets)
+    going = np.arange(len(sets))
     for _ in range(MEAN_ITERATIONS):
-        relative = q @ _right_product(median * _CONJUGATE)
-        sine = np.linalg.norm(relative[:, 1:], axis=1)
-        distance = 2 * np.arctan2(sine, np.abs(relative[:, 0]))
+        relative = q[going] @ _right_product(median[going] * _CONJUGATE)
+        sine = np.linalg.norm(relative[..., 1:], axis=2)
+        distance = 2 * np.arctan2(sine, np.abs(relative[..., 0]))
         met = distance < MEAN_TOLERANCE
         weight = np.divide(1, distance, out=np.zeros_like(distance), where=~met)
-        unit = np.divide(np.copysign(1, relative[:, 0]), sine, out=np.zeros_like(sine), where=~met)
-        pull = unit @ relative[:, 1:]
-        length = np.linalg.norm(pull)
-        excess = length - met.sum()
-        if excess <= 0:
+        unit = np.divide(np.copysign(1, relative[..., 0]), sine, out=np.zeros_like(sine), where=~met)
+        pull = np.einsum("sk,skj->sj", unit, relative[..., 1:])
+        length = np.linalg.norm(pull, axis=1)
+        excess = length - met.sum(axis=1)
+        moving = excess > 0
+        going, pull, length = going[moving], pull[moving], length[moving]
+        step = excess[moving] / weight.sum(axis=1)[moving]
+        turn = np.column_stack([np.cos(step / 2), (np.sin(step / 2) / length)[:, None] * pull])
+        median[going] = (turn[:, None] @ _right_product(median[going]))[:, 0]
+        going = going[step >= MEAN_TOLERANCE]
+        if not len(going):
             break
-        step = excess / weight.sum()
-        median = np.append(np.cos(step / 2), np.sin(step / 2) / length * pull) @ _right_product(median)
-        if step < MEAN_TOLERANCE:
-            break
-    return from_quaternion(median)
+    return from_quaternion(median).reshape(*r.shape[:-3], 3, 3)
 
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+_ENTRY = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
+_SIGN = np.array([[1, 1, 1, 1], [-1, 1, -1, 1], [-1, 1, 1, -1], [-1, -1, 1, 1]])
 
 
 def _right_product(q: Array) -> Array:
-    """Matrix (4, 4) with p @ it the Hamilton product p q of quaternions."""
-    w, x, y, z = q
-    return np.array([[w, x, y, z], [-x, w, -z, y], [-y, z, w, -x], [-z, -y, x, w]])
+    """Matrices (..., 4, 4) with p @ them the Hamilton products p q of quaternions."""
+    product: Array = q[..., _ENTRY] * _SIGN
+    return product
 
 
 def _geometric_median(r: Array) -> Array:
-    """Matrix (3, 3) that minimises the sum of Frobenius distances to r (k, 3, 3), to 1e-6 (Weiszfeld)."""
-    entries = r.reshape(len(r), 9)
-    center: Array = entries.mean(axis=0)
+    """Matrices (s, 3, 3) that minimise the sum of Frobenius distances to r (s, k, 3, 3), to 1e-6 (Weiszfeld)."""
+    entries = r.reshape(*r.shape[:2], 9)
+    center: Array = entries.mean(axis=1)
+    going = np.arange(len(r))
     for _ in range(MEAN_ITERATIONS):
-        weight = 1 / np.maximum(np.linalg.norm(entries - center, axis=1), MEAN_TOLERANCE)
-        previous, center = center, weight @ entries / weight.sum()
-        if np.linalg.norm(center - previous) < 1e-6:
+        own = entries[going]
+        weight = 1 / np.maximum(np.linalg.norm(own - center[going, None], axis=2), MEAN_TOLERANCE)
+        moved = np.einsum("sk,skj->sj", weight, own) / weight.sum(axis=1, keepdims=True)
+        step = np.linalg.norm(moved - center[going], axis=1)
+        center[going] = moved
+        going = going[step >= 1e-6]
+        if not len(going):
             break
-    return center.reshape(3, 3)
+    return center.reshape(-1, 3, 3)

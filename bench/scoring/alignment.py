@@ -17,17 +17,17 @@ ANCHORS = 32
 ANCHOR_ITERATIONS = 20
 ANCHOR_TOLERANCE = 1e-5  # radians
 
-_CENTERS = {"l1": so3.geodesic_median, "chordal": so3.chordal_mean, "karcher": so3.karcher_mean}
-RULES = (*_CENTERS, "anchors")
+_MEANS = {"chordal": so3.chordal_mean, "karcher": so3.karcher_mean}
+RULES = ("l1", *_MEANS, "anchors")
 
 
 def align(estimate: Floats, truth: Floats, rule: str = "l1") -> Floats:
-    """Gauge (3, 3) Q with estimate_i @ Q ~ truth_i.
+    """Gauge (..., 3, 3) Q with estimate_i @ Q ~ truth_i.
 
     Parameters
     ----------
     estimate, truth
-        (k, 3, 3), k >= 1, all finite: the cameras that are both solved and known.
+        (..., k, 3, 3), k >= 1, all finite: the cameras that are both solved and known.
     rule
         The centre that is taken of the rotations Q_i = estimate_i^T truth_i:
 
@@ -44,9 +44,11 @@ def align(estimate: Floats, truth: Floats, rule: str = "l1") -> Floats:
     """
     if rule not in RULES:
         raise InputError(f"there is no alignment rule '{rule}'{suggestion(rule, RULES)}")
-    if rule == "anchors":
-        return _anchored(estimate, truth)
-    return _CENTERS[rule](np.swapaxes(estimate, -1, -2) @ truth)
+    if rule == "l1":
+        return so3.geodesic_median(np.swapaxes(estimate, -1, -2) @ truth)
+    if estimate.ndim > 3:
+        return np.array([align(e, t, rule) for e, t in zip(estimate, truth, strict=True)])
+    return _anchored(estimate, truth) if rule == "anchors" else _MEANS[rule](np.swapaxes(estimate, -1, -2) @ truth)
 
 
 def _anchored(estimate: Floats, truth: Floats) -> Floats:

@@ -1,5 +1,7 @@
 """How far an estimate is from the truth, camera by camera, and from the measurements, edge by edge."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,6 +9,7 @@ from bench import so3
 from bench.problem import Floats, Problem
 from bench.scoring.alignment import align
 
+TOGETHER = 10_000  # cameras aligned at once
 WITHIN_DEG = (1, 3, 5, 10, 30)
 
 
@@ -25,11 +28,24 @@ def camera_errors(rotations: Floats, truth: Floats, rule: str = "l1") -> Floats:
     rule
         One of `bench.scoring.alignment.RULES`.
     """
-    errors = np.full(len(truth), np.nan)
-    common = _known(rotations) & _known(truth)
-    if common.any():
-        gauge = align(rotations[common], truth[common], rule)
-        errors[common] = np.degrees(so3.angle_between(rotations[common] @ gauge, truth[common]))
+    return all_camera_errors([(rotations, truth)], rule)[0]
+
+
+def all_camera_errors(pairs: Sequence[tuple[Floats, Floats]], rule: str = "l1") -> list[Floats]:
+    """`camera_errors` of many estimates, each with its truth; small ones of one size are aligned together."""
+    common = [np.flatnonzero(_known(rotations) & _known(truth)) for rotations, truth in pairs]
+    errors = [np.full(len(truth), np.nan) for _, truth in pairs]
+    for size in {len(cameras) for cameras in common} - {0}:
+        alike = [k for k, cameras in enumerate(common) if len(cameras) == size]
+        together = max(1, TOGETHER // size)
+        for start in range(0, len(alike), together):
+            chosen = alike[start : start + together]
+            estimates = np.stack([pairs[k][0][common[k]] for k in chosen])
+            truths = np.stack([pairs[k][1][common[k]] for k in chosen])
+            gauges = align(estimates, truths, rule)
+            angles = np.degrees(so3.angle_between(estimates @ gauges[:, None], truths))
+            for k, of_estimate in zip(chosen, angles, strict=True):
+                errors[k][common[k]] = of_estimate
     return errors
 
 
