@@ -214,6 +214,8 @@ def _with_oracle(frame: "pd.DataFrame", along: Mapping[int, Curve]) -> "pd.DataF
     """Add the row of the best checkpoint after the row of each estimate that has checkpoints."""
     import pandas as pd
 
+    if not along:
+        return frame
     rows = frame.to_dict("records")
     added = pd.DataFrame([_oracle_row(rows[k], one) for k, one in along.items()], index=list(along))
     both = pd.concat([frame, added.astype(frame.dtypes.to_dict(), errors="ignore")]).sort_index(kind="stable")

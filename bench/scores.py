@@ -2,7 +2,8 @@
 
 What is kept can be computed again from the records at any time. It lies in ``RUN/scores/<rule>-<version>``, a
 Parquet file for every batch that was scored; the version is a hash of the scoring code, so that a changed score is
-a new one everywhere. A row is used as long as its record is the file that was scored, by its time of modification.
+a new one everywhere. A row is used as long as its record is the file that was scored, by its time of
+modification; no estimate is replaced without its record.
 """
 
 import contextlib

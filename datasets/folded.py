@@ -20,7 +20,7 @@ from ._statistics import statistics
 _ATTEMPTS = 1000
 
 
-@dataset("folded", title="Folded scenes")
+@dataset("folded", title="Folded scenes", cite="tejus2023")
 @dataclass(frozen=True)
 class Folded:
     """A scene of which a part is turned as one piece by wrong measurements that agree with each other.

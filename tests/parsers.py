@@ -102,6 +102,7 @@ def _selection(data: bytes, folder: Path) -> object:
 
 
 def _result(path: Path) -> object:
+    (path.parent / "estimate.npz").write_bytes(_npz(**ESTIMATE))
     try:
         return read_output(path.parent)
     except UnusableError as error:

@@ -167,13 +167,14 @@ def test_ratios() -> None:
 def worsened(run: Path, copy: Path) -> Path:
     """A copy of a run in which one method's cameras are turned at random, and another one's job has crashed."""
     shutil.copytree(run, copy)
-    for path in (copy / "records").glob("*.json"):
+    for path in (copy / "records").glob("*/*.json"):
         record = json.loads(path.read_text())
         if record["job"]["method"] == "l1-irls":
-            estimate = copy / "estimates" / f"{path.stem}.npz"
+            estimate = copy / "estimates" / path.parent.name / f"{path.stem}.npz"
             rotations = load_estimate(estimate, record).rotations
             turned = so3.exp(0.3 * np.random.default_rng(0).standard_normal((len(rotations), 3))) @ rotations
             np.savez(estimate, **dict(np.load(estimate)) | {"rotations": turned})
+            path.touch()  # as if both had been written anew
         else:
             path.write_text(json.dumps(record | {"outcome": "crashed", "status": "crashed(SIGSEGV)"}))
     return copy

@@ -21,7 +21,7 @@ from bench.execution import dask
 from bench.runner import Options, Run
 
 KILLED_JOBS = int(os.environ.get("ROTSYNC_KILLED_JOBS", "60"))
-TIMES = ("solve_s", "wall_s", "peak_mib", "finished", "provenance")
+TIMES = ("solve_s", "wall_s", "peak_mib", "log", "finished", "provenance")
 
 
 @pytest.fixture(scope="module")

@@ -51,8 +51,9 @@ def test_every_deterministic_configuration_is_bit_identical_under_other_seeds(tm
 
 
 @pytest.fixture
-def liar(tmp_path: Path) -> Path:
+def liar(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A method that declares itself deterministic and is not, in the way it is told to."""
+    monkeypatch.delenv("PYTHONHASHSEED", raising=False)  # dask sets it, and leaves it
     path = tmp_path / "liar.py"
     path.write_text(LIAR)
     return path

@@ -134,9 +134,9 @@ def test_a_record_tells_where_it_comes_from(faulty_plugin: Path, tmp_path: Path)
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"seeds": 0}, "seeds must be above zero, not 0"),
-        ({"timeout_s": -1.0}, "timeout_s must be above zero, not -1"),
-        ({"plugins": (Path("nowhere.py"),)}, "--plugin nowhere.py: there is no such Python file"),
+        ({"seeds": 0}, "'seeds' is 0, not from 1 to"),
+        ({"timeout_s": -1.0}, "'timeout_s' is -1.0, not a positive number"),
+        ({"plugins": (Path("nowhere.py"),)}, "--plugin 'nowhere.py': there is no such Python file"),
     ],
 )
 def test_bad_options_are_one_sentence(

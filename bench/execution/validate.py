@@ -72,7 +72,7 @@ def _complaints(problem: Problem, estimate: Estimate, elapsed: float) -> Iterabl
     if not _is_number(seconds):
         yield f"conversion_s must be a number of seconds, not {_brief(seconds)}"
     if not 0 <= seconds <= elapsed:
-        yield f"conversion_s is {seconds:g} s, which is not within the time that solve took"
+        yield f"conversion_s is {float(seconds):g} s, which is not within the time that solve took"
     if estimate.iterations is not None and not (_is_whole(estimate.iterations) and estimate.iterations >= 0):
         yield f"iterations must be a whole number or None, not {_brief(estimate.iterations)}"
     for name in ("cost", "certificate"):
