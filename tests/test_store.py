@@ -235,6 +235,18 @@ def test_a_full_disk_stops_the_run_and_loses_nothing(faulty_plugin: Path, finish
     assert finished < 4
 
 
+def test_an_estimate_that_finds_no_room_is_no_failure_of_its_method(faulty_plugin: Path, small_disk: Path) -> None:
+    run = Run("quick", ["faulty"], ["toy[n=100]"], Options(out=small_disk / "run", plugins=(faulty_plugin,)))
+    run.prepare()
+    filling = small_disk / "filling"
+    filling.write_bytes(bytes(shutil.disk_usage(small_disk).free - 4096))  # an estimate takes two pages, a result one
+    with pytest.raises(InputError, match="No space left on device; what is finished is kept"):
+        list(run.execute())
+    assert run.store.record(run.cells[0].job.id) is None
+    filling.unlink()
+    assert [record["status"] for _, record in run.execute()] == ["ok"]
+
+
 def test_a_full_disk_is_one_sentence(faulty_plugin: Path, small_disk: Path) -> None:
     (small_disk / "filling").write_bytes(bytes(shutil.disk_usage(small_disk).free - 40960))
     arguments = ("--plugin", faulty_plugin, "-m", "faulty", "-d", "toy", "--out", small_disk / "run")

@@ -6,6 +6,7 @@ the folder for its two results, ``estimate.npz`` and ``result.json`` (written la
 
 import copy
 import dataclasses
+import errno
 import functools
 import importlib
 import json
@@ -27,7 +28,7 @@ from bench.arrays import load_problem, save_estimate
 from bench.errors import described
 from bench.execution import outcome
 from bench.execution.outcome import Outcome
-from bench.execution.output import ESTIMATE_FILE, RESULT_FILE
+from bench.execution.output import DISK_FULL, ESTIMATE_FILE, RESULT_FILE
 from bench.execution.threads import pin_threads
 from bench.execution.validate import kept_warnings, scalars, what_is_wrong
 from bench.problem import Estimate, Floats, Problem, Skipped
@@ -160,7 +161,19 @@ def solve(request: Request, prepared: Prepared, result: dict[str, Any]) -> Outco
             solves_s, waited = _repeated(method, pristine, request, info.name)
         result |= {"solves_s": solves_s, "waited": max(0.0, waited)}
     result |= scalars(estimate)
-    save_estimate(Path(request.folder, ESTIMATE_FILE), estimate)
+    return _saved(estimate, Path(request.folder, ESTIMATE_FILE), result)
+
+
+def _saved(estimate: Estimate, path: Path, result: dict[str, Any]) -> Outcome:
+    """Keep the estimate; a full disk is told as such, since it is no fault of the method."""
+    try:
+        save_estimate(path, estimate)
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        path.unlink(missing_ok=True)
+        result[DISK_FULL] = error.strerror
+        return Outcome(outcome.ERROR, str(error))
     return Outcome(outcome.OK)
 
 

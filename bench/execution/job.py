@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from bench import provenance
+from bench.errors import InputError
 from bench.execution import outcome
 from bench.execution.child import Request
 from bench.execution.launch import Launcher, LaunchError, ServerLostError
 from bench.execution.outcome import Outcome
-from bench.execution.output import UnusableError, read_output
+from bench.execution.output import DISK_FULL, UnusableError, read_output
 from bench.execution.supervise import Limits, supervise
 
 LOG_OF_OK = 1000  # characters of the output of a job that ended well; others keep all that `log.Tail` has
@@ -56,7 +57,12 @@ def _attempt(
 def _reported(folder: Path, code: int, kills: int) -> tuple[Outcome, dict[str, Any]]:
     """What a child that ended by itself has left; `kills` is `outcome.kernel_kills` from before it was started."""
     try:
-        return read_output(folder) or (outcome.crashed(code, by_kernel=outcome.kernel_kills() > kills), {})
+        read = read_output(folder)
+        if read is not None and DISK_FULL in read[1]:
+            raise InputError(
+                f"{folder}: {read[1][DISK_FULL]}; what is finished is kept, and the same command continues"
+            )
+        return read or (outcome.crashed(code, by_kernel=outcome.kernel_kills() > kills), {})
     except UnusableError as error:
         return Outcome(outcome.INVALID_OUTPUT, str(error)), {}
 

@@ -12,6 +12,7 @@ from bench.execution.outcome import Outcome
 
 ESTIMATE_FILE = "estimate.npz"
 RESULT_FILE = "result.json"
+DISK_FULL = "disk_full"  # in a result: why the estimate could not be written
 LARGEST_RESULT = 2**24  # bytes; the scalars of a few hundred thousand checkpoints fit into it
 OF_CHILDREN = (outcome.OK, outcome.SKIPPED, outcome.ERROR, outcome.OUT_OF_MEMORY, outcome.INVALID_OUTPUT)
 
