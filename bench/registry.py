@@ -392,7 +392,8 @@ def _coerced(value: Any, hint: Any, what: str) -> Any:
         elif isinstance(value, option) and not (option is int and isinstance(value, bool)):
             return value
     takes = " or ".join(_spelled(option) for option in options)
-    raise InputError(f"{what} takes {takes}, not {selection.format_value(value)[:80]}")
+    given = selection.format_value(value)[:80]
+    raise InputError(f"{what} takes {takes}, not {given if given.isprintable() else shown(value)}")
 
 
 def _spelled(option: Any) -> str:
