@@ -37,7 +37,6 @@ SOURCES = (
     "so3.py",
     "problem.py",
     "scored.py",
-    "scores.py",
     "scoring/alignment.py",
     "scoring/errors.py",
     "scoring/roc.py",
@@ -108,7 +107,7 @@ def scores_of(store: Store, jobs: Sequence[Job], rule: str) -> Scores:
     folder = store.folder / "scores" / f"{rule}-{_version()}"
     parts = [part for path in sorted(folder.glob("*.parquet")) if (part := _read(path))]
     ids = pa.array([job.id for job in jobs], pa.string())
-    stamps = np.array([_stamp(store, job.id) for job in jobs], dtype=np.int64)
+    stamps = _stamps(store, jobs)
     found = _located(parts, ids, stamps)
     scorer = _Scorer(store, rule)
     todo = np.flatnonzero((found < 0) & (stamps >= 0)).tolist()
@@ -178,12 +177,17 @@ def _version() -> str:
     return hashlib.sha256(b"".join((here / name).read_bytes() for name in SOURCES)).hexdigest()[:12]
 
 
-def _stamp(store: Store, job_id: str) -> int:
-    """When a record was written, in nanoseconds; -1 where there is none."""
-    try:
-        return os.stat(store.record_path(job_id)).st_mtime_ns
-    except FileNotFoundError:
-        return -1
+def _stamps(store: Store, jobs: Sequence[Job]) -> Any:
+    """When each record was written, in nanoseconds; -1 where there is none."""
+    folder = os.fspath(store.record_path("").parent)  # as text: a million paths are slow to build
+
+    def stamp(job_id: str) -> int:
+        try:
+            return os.stat(f"{folder}/{job_id[:2]}/{job_id}.json").st_mtime_ns
+        except FileNotFoundError:
+            return -1
+
+    return np.array([stamp(job.id) for job in jobs], dtype=np.int64)
 
 
 class _Part:
