@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from bench import selection
-from bench.errors import InputError
+from bench.errors import InputError, shown
 from bench.execution import outcome
 from bench.experiment import Suite
 from bench.papers.computed import Computed, extended, label, spelled
@@ -113,7 +113,7 @@ class Claims:
         """Check the names of the forms."""
         for form in (form for statement in self.statements for form in statement.forms):
             if form not in self.forms:
-                raise ValueError(f"unknown form '{form}'{suggestion(form, self.forms)}")
+                raise ValueError(f"unknown form {shown(form)}{suggestion(form, self.forms)}")
 
     def suites(self, name: str) -> tuple[Suite, ...]:
         """What has to run: a suite for each dataset and number of seeds."""
