@@ -9,8 +9,9 @@ import numpy as np
 
 from bench import so3
 from bench.arrays import save_estimate
+from bench.plan import Job, Plan
 from bench.problem import Checkpoint, Estimate, Floats, Instance
-from bench.store import Job, Plan, Store, digest
+from bench.store import Store, digest
 from tests.graphs import random_edges, simulated
 
 Errors = Callable[[np.random.Generator, int], Floats]  # degrees (n,)

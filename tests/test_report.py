@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from bench.reporting.report import figures, reversals, words
+from bench.reporting.report import figures, ranks, reversals, words
 from bench.reporting.report.embed import compact
 from bench.reporting.report.leaderboard import ALL_SCENES, leaderboard
 from bench.reporting.report.page import render, write_report
@@ -311,3 +311,20 @@ class TestFigures:
         errors = np.linspace(0, 50, 101)
         assert figures.quantiles_of([errors]) == pytest.approx(np.linspace(0, 50, 51))
         assert figures.quantiles_of([np.full(3, np.nan)]) is None
+
+
+class TestRanks:
+    def test_the_better_method_comes_first_in_all_three(self, tmp_path):
+        methods = [Made("worse", scale_deg=3.0), Made("better", scale_deg=1.0)]
+        frame = score(made_run(tmp_path, ["a", "b", "c", "d", "e"], methods)).frame
+        probabilities, difference, profiles = ranks.sections(frame)
+        (heat,) = probabilities.figure["data"]
+        assert heat["y"] == ["better", "worse"]
+        assert heat["z"][0] == [100.0, 0.0]
+        assert difference.figure["data"][0]["x"] == [1.0, 2.0]
+        assert "over 5 problems" in difference.paragraphs[0]
+        first = {trace["name"]: trace["y"][0] for trace in profiles.figure["data"]}
+        assert first == {"worse": 0.0, "better": 100.0}
+
+    def test_one_problem_has_no_ranks(self, tmp_path):
+        assert ranks.sections(score(made_run(tmp_path, ["a"], [Made("one"), Made("two")])).frame) == []

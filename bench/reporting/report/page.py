@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from bench.reporting.report import overview, reversals, words
+from bench.reporting.report import overview, ranks, reversals, words
 from bench.reporting.report.embed import compact
 from bench.reporting.report.failures import Failure, failures, notes
 from bench.reporting.report.leaderboard import leaderboard
@@ -66,7 +66,7 @@ def render(store: Store, by_rule: Mapping[str, Results]) -> str:
     headline = _headline(scenes)
     standing = standings(headline)
     suites = list(dict.fromkeys(plan.suite for plan in store.plans()))
-    sections = overview.overall(results, headline, standing)
+    sections = [*overview.overall(results, headline, standing), *ranks.sections(results.frame)]
     pages = _scene_pages(store, results, scenes)
     data = {"leaderboard": leaderboard(by_scene)} | {
         f"figure-{s.id}": compact(s.figure) for s in [*sections, *(s for p in pages for s in p.sections)] if s.figure
