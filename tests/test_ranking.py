@@ -25,6 +25,12 @@ def row(instance: str, method: str, median: float, **more: object) -> dict[str, 
 
 
 class TestBlocks:
+    def test_a_method_that_is_not_installed_is_left_out_and_not_ranked_last(self) -> None:
+        rows = [row(scene, method, 1.0) for scene in "pq" for method in "ab"]
+        absent = {"status": "not-installed(pip install c)", "n_scored": 0}
+        found = blocks(pd.DataFrame([*rows, *(row(scene, "c", np.nan, **absent) for scene in "pq")]))
+        assert found.methods == (("a", ""), ("b", ""))
+
     def test_seeds_of_one_instance_are_one_block_and_other_instances_one_each(self) -> None:
         rows = [row("real", "a", median, seed=s) for s, median in enumerate((1.0, 4.0))]
         rows += [row("real", "b", 3.0)]

@@ -45,13 +45,17 @@ class Blocks:
         return len(self.methods) > 1 and len(self.values) >= LEAST_BLOCKS
 
 
+_DID_NOT_RUN = ("not-installed", "not-run")
+
+
 def blocks(frame: "pd.DataFrame", column: str = "median_deg", floor: float = FLOOR_DEG) -> Blocks:
     """Gather scored rows into independent problems.
 
     A block is an instance. Seeds that share one are not independent of each other, nor is a scene under another
     protocol: they are averaged, geometrically. Where the instance changes with the seed, every seed is a block of
     its own. A job that failed, and one that scored less than 95 % as many cameras as the most complete one, is worse
-    than all that did not. Problems without ground truth, or that nobody solved, are left out.
+    than all that did not. Problems without ground truth, or that nobody solved, are left out, and so are methods that
+    did not run everywhere, for want of their package or of time: that says nothing of them.
 
     Parameters
     ----------
@@ -69,7 +73,7 @@ def blocks(frame: "pd.DataFrame", column: str = "median_deg", floor: float = FLO
     whole = (frame["status"] == "ok") & (scored > 0) & (scored >= MIN_COVERAGE * most)
     value = np.log(pd.to_numeric(frame[column], errors="coerce").clip(lower=floor)).where(whole, np.inf)
     rows = frame[["dataset", "instance", "method", "params"]].assign(draw=_draws(frame), value=value.fillna(np.inf))
-    rows = rows[most > 0]
+    rows = rows[(most > 0) & ~frame["status"].str.startswith(_DID_NOT_RUN)]
     keys = ["dataset", "instance", "draw"]
     if rows.empty:
         return Blocks((), np.empty((0, 0)), ())
