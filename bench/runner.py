@@ -217,7 +217,6 @@ def _resolved(
     if methods and datasets and named is None:
         changes["name"] = "custom"
     suite = replace(suite, **{key: value for key, value in changes.items() if value is not None})
-    _check_positive(suite)
     if options.threads is not None and options.threads < 1:
         raise InputError(f"threads must be above zero, not {options.threads}")
     return experiment.resolve(
@@ -264,9 +263,3 @@ def _check_kind(store: Store, timing: bool) -> None:
     if {plan.timing for plan in store.plans()} - {timing}:
         holds, wants = ("an ordinary", "a timing") if timing else ("a timing", "an ordinary")
         raise InputError(f"{store.folder} holds {holds} run; give {wants} run a folder of its own with --out")
-
-
-def _check_positive(suite: Suite) -> None:
-    for name in ("seeds", "timeout_s", "memory_gib", "rounds"):
-        if getattr(suite, name) <= 0:
-            raise InputError(f"{name} must be above zero, not {getattr(suite, name):g}")

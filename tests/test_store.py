@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from commands import bench
 from conftest import FAULTY
@@ -126,6 +128,10 @@ def test_scores_that_cannot_be_kept_or_read_are_computed_again(store: Store) -> 
     whole = table(store.folder)
     for path in store.folder.glob("scores/*/*.parquet"):
         path.write_bytes(b"PAR1 and nothing more")
+    assert table(store.folder) == whole
+    for path in store.folder.glob("scores/*/*.parquet"):  # as an earlier version with fewer columns would leave them
+        path.write_bytes(b"")
+        pq.write_table(pa.table({"job": [job.id for job in store.jobs()]}), path)
     assert table(store.folder) == whole
     shutil.rmtree(store.folder / "scores")
     (store.folder / "scores").write_text("in the way")
