@@ -29,7 +29,8 @@ def run(
     align
         "l1", "chordal", "karcher" or "anchors".
     options
-        Fields of `bench.runner.Options`, such as ``out``, ``data_dir``, ``seeds`` and ``jobs``; paths may be strings.
+        Fields of `bench.running.run.Options`, such as ``out``, ``data_dir``, ``seeds`` and ``jobs``; paths may be
+        strings.
 
     Returns
     -------
@@ -40,8 +41,8 @@ def run(
     InputError
         On anything that the caller has to change.
     """
-    from bench.results import score
-    from bench.runner import Options, Run
+    from bench.running.run import Options, Run
+    from bench.scoring.results import score
 
     paths = {name: Path(options[name]) for name in ("out", "data_dir") if options.get(name) is not None}
     planned = Run(suite, methods, datasets, Options(**options | paths))

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import seeds, so3
-from bench.errors import InputError
-from bench.problem import Instance, Ints, Problem
-from bench.registry import Source, dataset
+from bench.core import seeds, so3
+from bench.core.errors import InputError
+from bench.core.problem import Instance, Ints, Problem
+from bench.plugins.registry import Source, dataset
 
-from ._folders import revision
-from ._measurements import CODE, Measurements, OutlierModel
-from ._noise import Noise
-from ._statistics import statistics
+from ._files.folders import revision
+from ._simulated.measurements import CODE, Measurements, OutlierModel
+from ._simulated.noise import Noise
+from ._simulated.statistics import statistics
 
 _ATTEMPTS = 1000
 _MOST_CAMERAS = 30_000  # every pair is drawn; this many take 7 GiB

@@ -7,16 +7,16 @@ from typing import Literal
 
 import numpy as np
 
-from bench.errors import InputError
+from bench.core.errors import InputError
+from bench.core.problem import Floats, Instance
 from bench.formats.graph import GraphFile
 from bench.formats.one_dsfm import BUNDLE, COMPONENT, EDGES, IMAGES, read_bundle, read_folder
-from bench.problem import Floats, Instance
-from bench.registry import Missing, Source, dataset, suggestion
+from bench.plugins.registry import Missing, Source, dataset, suggestion
 
-from ._archive import damaged, unpack
-from ._download import Archive, download
-from ._folders import cache, revision, roots
-from ._statistics import statistics
+from ._files.archive import damaged, unpack
+from ._files.download import Archive, download
+from ._files.folders import cache, revision, roots
+from ._simulated.statistics import statistics
 
 Protocol = Literal["truth-subgraph", "component"]
 

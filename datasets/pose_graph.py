@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.errors import InputError
+from bench.core.errors import InputError
+from bench.core.problem import Floats, Instance, Problem
 from bench.formats.pose_graph import read_pose_graph
-from bench.problem import Floats, Instance, Problem
-from bench.registry import Missing, Source, dataset, suggestion
+from bench.plugins.registry import Missing, Source, dataset, suggestion
 
-from ._folders import revision, roots
-from ._statistics import statistics
+from ._files.folders import revision, roots
+from ._simulated.statistics import statistics
 
 SPHERE = "sphere2500"
 FOLDER = "pose_graphs"

@@ -4,15 +4,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench import seeds, so3
+from bench.core import seeds, so3
+from bench.core.problem import Instance, Problem
 from bench.formats.npz import read_topology
-from bench.problem import Instance, Problem
-from bench.registry import Missing, Source, dataset, suggestion
+from bench.plugins.registry import Missing, Source, dataset, suggestion
 
-from ._folders import revision, roots
-from ._measurements import CODE, Measurements, OutlierModel
-from ._noise import Noise
-from ._statistics import statistics
+from ._files.folders import revision, roots
+from ._simulated.measurements import CODE, Measurements, OutlierModel
+from ._simulated.noise import Noise
+from ._simulated.statistics import statistics
 
 FOLDER = "viewgraphs"
 NOTE = "simulated measurements: only who is connected to whom is real; do not compare with published tables"

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
 from . import spectral
-from ._certificate import ROUNDING, chordal_cost, smallest_eigenvalue
-from ._rounding import rounded
-from ._starts import Seeded, Start, start_rotations
+from ._lib.graph.starts import Seeded, Start, start_rotations
+from ._lib.linear.certificate import ROUNDING, chordal_cost, smallest_eigenvalue
+from ._lib.linear.rounding import rounded
 
 if TYPE_CHECKING:
     from scipy import sparse

@@ -5,11 +5,11 @@ from typing import Literal
 
 import numpy as np
 
-from bench.problem import Estimate, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Problem
+from bench.plugins.registry import method
 
 from . import spectral
-from ._cemp import (
+from ._lib.graph.cemp import (
     ITERATIONS,
     MOST_ITERATIONS,
     TRIANGLES,
@@ -18,7 +18,7 @@ from ._cemp import (
     tree_of_least_corruption,
     weighted_spectral,
 )
-from ._triangles import sample_triangles
+from ._lib.graph.triangles import sample_triangles
 
 
 @method("cemp", title="CEMP", cite="lerman2022", requires=("scipy", "numba"), robust=True, deterministic=False)

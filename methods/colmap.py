@@ -5,10 +5,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from ._stopwatch import Stopwatch
+from ._lib.stopwatch import Stopwatch
 
 
 @method(

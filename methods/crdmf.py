@@ -7,13 +7,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.problem import Checkpoint, Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Checkpoint, Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from . import _crdmf_dense, _dmf_thin, spectral
-from ._all_triangles import AllTriangles
-from ._dmf_thin import Factors, Observed, nearest_rotations
-from ._starts import SEEDED, Start, start_rotations
+from . import spectral
+from ._lib.dmf import crdmf_dense, dmf_thin
+from ._lib.dmf.dmf_thin import Factors, Observed, nearest_rotations
+from ._lib.graph.all_triangles import AllTriangles
+from ._lib.graph.starts import SEEDED, Start, start_rotations
 from .spanning_tree import propagated, tree_edges
 
 DEPTHS = (1, 2, 3, 4, 2, 3, 1, 2, 3, 4)  # of the published ten candidates, the different ones first
@@ -74,7 +75,7 @@ class CRDMF:
     iterations
         For each candidate. None: 500 for thin, 100,000 for paper.
     lr
-        Step. None: 0.05 for thin, where it is relative (see `_dmf_thin.descend`), 0.3 for paper.
+        Step. None: 0.05 for thin, where it is relative (see `dmf_thin.descend`), 0.3 for paper.
     momentum
         Share of the last step that is repeated.
     init_scale
@@ -190,7 +191,7 @@ class CRDMF:
                 weights[:] *= reweighted(problem, rotations())
                 blocks[:] = np.concatenate([weights, weights, np.ones(problem.n)])[observed.order]
 
-        cost = _dmf_thin.descend(
+        cost = dmf_thin.descend(
             observed,
             factors,
             "l1",
@@ -204,7 +205,7 @@ class CRDMF:
         return rotations(), weights, cost
 
     def _dense_run(self, problem: Problem, depth: int, rng: np.random.Generator) -> Run:
-        network = _crdmf_dense.SymmetricFactorization(
+        network = crdmf_dense.SymmetricFactorization(
             problem,
             depth=depth,
             init_scale=self.init_scale or 1e-3,

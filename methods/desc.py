@@ -5,15 +5,16 @@ from typing import Literal
 
 import numpy as np
 
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from . import _laplacian, spectral
-from ._cemp import inlier_weights, weighted_spectral
-from ._cycle_refinement import refined
-from ._simplex_descent import consistent_levels
-from ._starts import Start, start_rotations
-from ._triangles import codegrees, sample_triangles
+from . import spectral
+from ._lib.descent.simplex_descent import consistent_levels
+from ._lib.graph.cemp import inlier_weights, weighted_spectral
+from ._lib.graph.cycle_refinement import refined
+from ._lib.graph.starts import Start, start_rotations
+from ._lib.graph.triangles import codegrees, sample_triangles
+from ._lib.linear import laplacian
 
 FEWEST_TRIANGLES = 30
 
@@ -80,7 +81,7 @@ class DESC:
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
         spectral.compile_and_load()
-        _laplacian.compile_and_load()
+        laplacian.compile_and_load()
         two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
         self.solve(two_cameras, np.random.default_rng())
 

@@ -6,12 +6,13 @@ from typing import Literal
 
 import numpy as np
 
-from bench.problem import Checkpoint, Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Checkpoint, Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from . import _dmf_dense, _dmf_thin, spectral
-from ._dmf_thin import Factors, Loss, Observed, Report, nearest_rotations
-from ._starts import SEEDED, Start, start_rotations
+from . import spectral
+from ._lib.dmf import dmf_dense, dmf_thin
+from ._lib.dmf.dmf_thin import Factors, Loss, Observed, Report, nearest_rotations
+from ._lib.graph.starts import SEEDED, Start, start_rotations
 
 START_TOLERANCE = 1e-3  # radians; the descent moves further than that
 EXTRA = 0.1  # size of the columns beyond three at a spectral start, relative to a rotation's
@@ -89,7 +90,7 @@ class DMFSynch:
         Columns of the hidden factors, at least 3. None: 3 for thin, 3n for dense.
     lr
         Step. None: 0.3 for dense, where it is that of the mean loss; 0.05 for thin, where it is relative
-        (see `_dmf_thin.descend`).
+        (see `dmf_thin.descend`).
     momentum
         Share of the last step that is repeated.
     iterations
@@ -234,7 +235,7 @@ class DMFSynch:
     ) -> float:
         loss: Loss = self.loss or "l1/2"
         last = _chordal(self.smoothing_deg or LAST_SMOOTHING_DEG[loss])
-        return _dmf_thin.descend(
+        return dmf_thin.descend(
             observed,
             factors,
             loss,
@@ -248,7 +249,7 @@ class DMFSynch:
     def _solve_dense(self, problem: Problem, rng: np.random.Generator) -> Estimate:
         clock = time.perf_counter()
         loss: Literal["l1", "l2"] = "l2" if self.loss == "l2" else "l1"
-        network = _dmf_dense.DenseFactorization(
+        network = dmf_dense.DenseFactorization(
             problem,
             depth=self.layers,
             width=self.width or 3 * problem.n,

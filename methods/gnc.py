@@ -6,13 +6,13 @@ from typing import Literal
 
 import numpy as np
 
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
 from . import spectral
-from ._iterate import Iterate, floored, mean_norm
-from ._laplacian import LaplacianSolver
-from ._starts import Start, Started, start_rotations
+from ._lib.descent.iterate import Iterate, floored, mean_norm
+from ._lib.graph.starts import Start, Started, start_rotations
+from ._lib.linear.laplacian import LaplacianSolver
 
 FACTOR = 1.4  # by which the surrogate approaches the cost, as published
 BINARY = 1e-4  # weights this close to 0 or 1 are 0 or 1, as in GTSAM

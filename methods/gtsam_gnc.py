@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from bench.problem import Estimate, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Problem
+from bench.plugins.registry import method
 
 from . import spectral
-from ._gtsam import rotations_of, values_of
-from ._starts import Start, Started, start_rotations
-from ._stopwatch import Stopwatch
+from ._lib.graph.starts import Start, Started, start_rotations
+from ._lib.gtsam_values import rotations_of, values_of
+from ._lib.stopwatch import Stopwatch
 from .gnc import SURROGATES, GncLoss
 
 PRIOR_SIGMA = 1.0  # any; a prior on one camera fixes the gauge and costs nothing

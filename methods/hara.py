@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import so3
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from . import _laplacian
-from ._all_triangles import AllTriangles
-from ._descent import Descent
-from ._hierarchical_tree import hierarchical_tree, support_levels
-from ._losses import LOSSES
+from ._lib.descent.descent import Descent
+from ._lib.descent.losses import LOSSES
+from ._lib.graph.all_triangles import AllTriangles
+from ._lib.graph.hierarchical_tree import hierarchical_tree, support_levels
+from ._lib.linear import laplacian
 from .spanning_tree import tree_edges
 
 QUANTILES = (0.1, 0.2, 0.3)
@@ -74,7 +74,7 @@ class HARA:
 
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
-        _laplacian.compile_and_load()
+        laplacian.compile_and_load()
         triangle = Problem(3, np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32), np.tile(np.eye(3), (3, 1, 1)))
         self.solve(triangle, np.random.default_rng())
 

@@ -4,14 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Estimate, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Problem
+from bench.plugins.registry import method
 
-from . import _laplacian, spectral
-from ._descent import Descent
-from ._losses import LOSSES, LossName
-from ._starts import Start, Started, start_rotations
+from . import spectral
+from ._lib.descent.descent import Descent
+from ._lib.descent.losses import LOSSES, LossName
+from ._lib.graph.starts import Start, Started, start_rotations
+from ._lib.linear import laplacian
 
 
 @method("l1-irls", title="L1-IRLS", cite="chatterjee2018", requires=("scipy", "numba"), robust=True)
@@ -75,7 +76,7 @@ class L1IRLS(Started):
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
         spectral.compile_and_load()
-        _laplacian.compile_and_load()
+        laplacian.compile_and_load()
         two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
         self.solve(two_cameras, np.random.default_rng())
 

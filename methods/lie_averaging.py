@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.problem import Estimate, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Problem
+from bench.plugins.registry import method
 
 from . import spectral
-from ._iterate import Iterate, mean_norm
-from ._laplacian import LaplacianSolver
-from ._starts import Start, Started, start_rotations
+from ._lib.descent.iterate import Iterate, mean_norm
+from ._lib.graph.starts import Start, Started, start_rotations
+from ._lib.linear.laplacian import LaplacianSolver
 
 
 @method("lie-averaging", title="Lie-algebraic averaging", cite="govindu2004", requires=("scipy", "numba"))

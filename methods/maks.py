@@ -5,15 +5,15 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
 from . import spectral
-from ._certificate import certificate_matrix, chordal_cost, multipliers, smallest_eigenvalue
-from ._rounding import nearest_rotations
-from ._smallest import smallest_eigenspace
-from ._starts import Seeded, Start, start_rotations
+from ._lib.graph.starts import Seeded, Start, start_rotations
+from ._lib.linear.certificate import certificate_matrix, chordal_cost, multipliers, smallest_eigenvalue
+from ._lib.linear.rounding import nearest_rotations
+from ._lib.linear.smallest import smallest_eigenspace
 
 if TYPE_CHECKING:
     from scipy import sparse

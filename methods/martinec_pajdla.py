@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from ._certificate import chordal_cost
-from ._davidson import block_laplacian, smallest_eigenspace
-from ._eigenspace import Eigenspace
+from ._lib.linear.certificate import chordal_cost
+from ._lib.linear.davidson import block_laplacian, smallest_eigenspace
+from ._lib.linear.eigenspace import Eigenspace
 from .spanning_tree import tree_rotations
 from .spectral import PRECISE
 

@@ -4,14 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from . import _laplacian, spectral
-from ._cemp import ITERATIONS, TRIANGLES, corruption_levels, tree_of_least_corruption
-from ._cycle_refinement import refined
-from ._starts import Start, start_rotations
-from ._triangles import sample_triangles
+from . import spectral
+from ._lib.graph.cemp import ITERATIONS, TRIANGLES, corruption_levels, tree_of_least_corruption
+from ._lib.graph.cycle_refinement import refined
+from ._lib.graph.starts import Start, start_rotations
+from ._lib.graph.triangles import sample_triangles
+from ._lib.linear import laplacian
 
 BETA = 32.0
 
@@ -69,7 +70,7 @@ class MPLS:
     def warm_up(self) -> None:
         """Compile the kernels and load scipy."""
         spectral.compile_and_load()
-        _laplacian.compile_and_load()
+        laplacian.compile_and_load()
         two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
         self.solve(two_cameras, np.random.default_rng())
 

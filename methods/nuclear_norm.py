@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import so3
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from ._starts import Seeded, Start, start_rotations
+from ._lib.graph.starts import Seeded, Start, start_rotations
 from .spectral import compile_and_load
 
 SMALL = 60  # cameras; up to here LAPACK finds all eigenvectors fastest

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from ._davidson import block_laplacian, smallest_eigenspace
-from ._eigenspace import Eigenspace
-from ._starts import Seeded, Start, start_rotations
+from ._lib.graph.starts import Start, Started, start_rotations
+from ._lib.linear.davidson import block_laplacian, smallest_eigenspace
+from ._lib.linear.eigenspace import Eigenspace
 from .spectral import PRECISE, compile_and_load
 
 SIGNS_TOLERANCE = 1e-3  # radians, of the solutions that only choose signs
@@ -26,7 +26,7 @@ for _axis in range(1, 4):
 
 @method("quaternion", title="Quaternion least squares", cite="govindu2001", requires=("scipy", "numba"))
 @dataclass(frozen=True)
-class Quaternion(Seeded):
+class Quaternion(Started):
     """Minimises sum_ij |s_ij q_ij q_j - q_i|^2 over quaternions q_i of unit norm in total and signs s_ij.
 
     1. A rotation is two quaternions, q and -q, and the equations q_i = s_ij q_ij q_j are linear only once the signs

@@ -5,12 +5,12 @@ from typing import Literal
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from . import _edge_kernels
-from ._starts import TOLERANCE, Seeded, Start, start_rotations
+from ._lib.graph.starts import TOLERANCE, Seeded, Start, start_rotations
+from ._lib.loops import edge_kernels
 from .spectral import compile_and_load, spectral_rotations
 
 SUBSPACE_STEPS = 2  # in each iteration, towards the best approximation of rank three
@@ -128,7 +128,7 @@ class Model:
         product = np.empty((self._problem.n, 3, 3))
         left, right = (self._basis @ self._core).reshape(-1, 3, 3), self._basis.reshape(-1, 3, 3)
         blocks = np.ascontiguousarray(x).reshape(-1, 3, 3)
-        _edge_kernels.clipped_product(
+        edge_kernels.clipped_product(
             self._problem.edges, self._problem.rotations, left, right, self._threshold, blocks, product
         )
         return product.reshape(-1, 3) + self._basis @ (self._core @ (self._basis.T @ x))

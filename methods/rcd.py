@@ -4,13 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.problem import Estimate, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Problem
+from bench.plugins.registry import method
 
-from . import _camera_kernels, spectral
-from ._certificate import ROUNDING, chordal_cost, smallest_eigenvalue
-from ._neighbours import neighbours_of
-from ._starts import Seeded, Start, start_rotations
+from . import spectral
+from ._lib.graph.neighbours import neighbours_of
+from ._lib.graph.starts import Seeded, Start, start_rotations
+from ._lib.linear.certificate import ROUNDING, chordal_cost, smallest_eigenvalue
+from ._lib.loops import camera_kernels
 
 
 @method("rcd", title="RCD", cite="parra2021", requires=("scipy", "numba"), certifies=True)
@@ -69,7 +70,7 @@ class RCD(Seeded):
         cost, gain = chordal_cost(problem, rotations), np.empty(1)
         reason, epochs = "epoch limit", 0
         while epochs < self.max_epochs:
-            _camera_kernels.rotation_sweep(seen.first, seen.cameras, seen.rotations, rotations, gain)
+            camera_kernels.rotation_sweep(seen.first, seen.cameras, seen.rotations, rotations, gain)
             cost -= 2 * gain[0]
             epochs += 1
             if 2 * gain[0] <= max(self.tolerance * cost, ROUNDING * problem.m):

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
 from . import spectral
-from ._iterate import Iterate, floored, mean_norm
-from ._laplacian import LaplacianSolver
-from ._losses import LOSSES, LossName
-from ._starts import Start, Started, start_rotations
+from ._lib.descent.iterate import Iterate, floored, mean_norm
+from ._lib.descent.losses import LOSSES, LossName
+from ._lib.graph.starts import Start, Started, start_rotations
+from ._lib.linear.laplacian import LaplacianSolver
 
 FIRST_DAMPING, SMALLEST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-8, 1e8  # of the weight of the edges of each camera
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from ._certificate import chordal_cost, multipliers, smallest_eigenvalue
-from ._rounding import rounded
+from ._lib.linear.certificate import chordal_cost, multipliers, smallest_eigenvalue
+from ._lib.linear.rounding import rounded
 from .spectral import compile_and_load, spectral_rotations
 
 if TYPE_CHECKING:

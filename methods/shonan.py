@@ -5,12 +5,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bench.problem import Estimate, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Problem
+from bench.plugins.registry import method
 
-from ._certificate import chordal_cost, smallest_eigenvalue
-from ._gtsam import rotations_of, values_of
-from ._stopwatch import Stopwatch
+from ._lib.gtsam_values import rotations_of, values_of
+from ._lib.linear.certificate import chordal_cost, smallest_eigenvalue
+from ._lib.stopwatch import Stopwatch
 from .spectral import compile_and_load, spectral_rotations
 
 HUBER = 1.345  # GTSAM's threshold, in units of sigma

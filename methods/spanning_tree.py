@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import so3
-from bench.problem import Estimate, Floats, Ints, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Ints, Problem
+from bench.plugins.registry import method
 
 if TYPE_CHECKING:
     from scipy import sparse

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from . import _edge_kernels
-from ._eigenspace import Eigenspace, dense_eigenspace, leading_eigenspace
+from ._lib.linear.eigenspace import Eigenspace, dense_eigenspace, leading_eigenspace
+from ._lib.loops import edge_kernels
 from .spanning_tree import hub, tree_rotations
 
 SMALL = 100  # cameras; up to here LAPACK solves the full problem fastest
@@ -128,7 +128,7 @@ def _eigenspace(problem: Problem, weights: Floats, diagonal: Floats, scale: Floa
     def multiply(x: Floats) -> Floats:
         product = np.empty((problem.n, 3, 3))
         blocks = np.ascontiguousarray(x).reshape(-1, 3, 3)
-        _edge_kernels.block_product(problem.edges, problem.rotations, weights, diagonal, blocks, product)
+        edge_kernels.block_product(problem.edges, problem.rotations, weights, diagonal, blocks, product)
         return product.reshape(-1, 3)
 
     start = _neighbourhood(problem) / scale[:, None, None]

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import method
+from bench.core.problem import Estimate, Floats, Problem
+from bench.plugins.registry import method
 
 from . import spectral
-from ._certificate import chordal_cost, smallest_eigenpair, smallest_eigenvalue
-from ._rounding import nearest_rotations
-from ._starts import Seeded, Start, start_rotations
+from ._lib.graph.starts import Seeded, Start, start_rotations
+from ._lib.linear.certificate import chordal_cost, smallest_eigenpair, smallest_eigenvalue
+from ._lib.linear.rounding import nearest_rotations
 
 FIRST_STEP = 1.0  # radians, about, at the camera that moves most, when the staircase escapes
 SHORTEST_STEP = 1e-6

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Checkpoint, Estimate, Floats, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Checkpoint, Estimate, Floats, Problem
+from bench.plugins.registry import method
 
-from . import _geodesic_kernels, spectral
-from ._starts import SEEDED, Start, start_rotations
+from . import spectral
+from ._lib.graph.starts import SEEDED, Start, start_rotations
+from ._lib.loops import geodesic_kernels
 
 CHORDAL = 8.0  # squared Frobenius distance of two rotations over the sine squared of half their angle
 
@@ -119,7 +120,7 @@ class TGMCMC:
         checkpoints = list[Checkpoint]()
         converged, t = False, 0
         while t < self.iterations and not converged:
-            _geodesic_kernels.bingham_forces(problem.edges, measured, cameras, forces, energy)
+            geodesic_kernels.bingham_forces(problem.edges, measured, cameras, forces, energy)
             if t % self.checkpoint_every == 0:
                 checkpoints.append(_checkpoint(t, clock, cameras, energy[0]))
             temperature = self._temperature(t)
@@ -127,11 +128,11 @@ class TGMCMC:
             if temperature > 0:
                 deviations = np.sqrt((1 - self.keep**2) * temperature / masses)
                 kicks[:] = deviations[:, None] * rng.standard_normal((problem.n, 4))
-            _geodesic_kernels.geodesic_step(cameras, velocities, forces, masses, kicks, self.keep, self.step)
+            geodesic_kernels.geodesic_step(cameras, velocities, forces, masses, kicks, self.keep, self.step)
             t += 1
             rotated = 2 * self.step * np.sqrt(np.sum(velocities**2) / problem.n)
             converged = temperature == 0 and rotated < tolerance
-        _geodesic_kernels.bingham_forces(problem.edges, measured, cameras, forces, energy)
+        geodesic_kernels.bingham_forces(problem.edges, measured, cameras, forces, energy)
         checkpoints.append(_checkpoint(t, clock, cameras, energy[0]))
         return Estimate(
             checkpoints[-1].rotations,

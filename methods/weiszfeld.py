@@ -4,13 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Estimate, Ints, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Ints, Problem
+from bench.plugins.registry import method
 
-from . import _camera_kernels, spectral
-from ._neighbours import neighbours_of
-from ._starts import Start, Started, start_rotations
+from . import spectral
+from ._lib.graph.neighbours import neighbours_of
+from ._lib.graph.starts import Start, Started, start_rotations
+from ._lib.loops import camera_kernels
 
 MET = 1e-9  # radians; a prediction this close to the camera counts as met
 
@@ -71,7 +72,7 @@ class Weiszfeld(Started):
         turns = np.empty(problem.n)
         reason, done = "iteration limit", 0
         while done < self.sweeps:
-            _camera_kernels.median_sweep(order, seen.first, seen.cameras, measured, MET, cameras, turns)
+            camera_kernels.median_sweep(order, seen.first, seen.cameras, measured, MET, cameras, turns)
             done += 1
             if turns.mean() < np.radians(self.tolerance_deg):
                 reason = f"mean step below {self.tolerance_deg:g} degrees"

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Floats, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Floats, Problem
+from bench.plugins.registry import method
 
 
 @method("chaos", title="Chaos", deterministic=False)

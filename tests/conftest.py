@@ -46,10 +46,10 @@ import os, signal, sys, time
 from dataclasses import dataclass
 from pathlib import Path
 import numpy as np
-from bench import so3
-from bench.problem import Estimate, Instance, Problem, Skipped
-from bench.registry import Source, dataset, method
-from bench.seeds import stream
+from bench.core import so3
+from bench.core.problem import Estimate, Instance, Problem, Skipped
+from bench.plugins.registry import Source, dataset, method
+from bench.core.seeds import stream
 
 
 @method("faulty", title="Faulty", deterministic=False)

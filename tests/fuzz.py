@@ -99,7 +99,7 @@ class Watch:
             self.rss = _rss_mib()
 
     def _read(self, data: bytes) -> str:
-        from bench.errors import InputError
+        from bench.core.errors import InputError
 
         self.was_refused = False
         try:

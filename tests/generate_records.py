@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import so3
-from bench.arrays import save_estimate
-from bench.plan import Job, Plan
-from bench.problem import Estimate, Instance, Problem
-from bench.store import Store, digest
+from bench.core import so3
+from bench.core.problem import Estimate, Instance, Problem
+from bench.storage.arrays import save_estimate
+from bench.storage.store import Store, digest
+from bench.suite.plan import Job, Plan
 
 CAMERAS, DATASETS, METHODS = 5, 10, 10
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Floats, Ints, Problem, oriented
+from bench.core import so3
+from bench.core.problem import Floats, Ints, Problem, oriented
 
 
 def random_edges(n: int, share: float, seed: int = 0) -> Ints:

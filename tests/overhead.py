@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from statistics import median
 
-from bench.runner import Options, Run
+from bench.running.run import Options, Run
 
 JOBS, FIRST = 300, 10  # the first few start the fork server
 

@@ -15,21 +15,22 @@ from pathlib import Path
 import numpy as np
 from scenes import UNREGISTERED, bundle_camera, egs_line, write_scene
 
-from bench import named, registry, selection, so3
-from bench.datasets._archive import damaged, unpack
-from bench.datasets._download import Archive
+from bench.core import so3
+from bench.core.errors import InputError
+from bench.core.problem import Instance, Problem
+from bench.datasets._files.archive import damaged, unpack
+from bench.datasets._files.download import Archive
 from bench.datasets.one_dsfm import FILES
-from bench.errors import InputError
 from bench.execution.output import UnusableError, read_output
-from bench.experiment import load_suite
-from bench.formats import read_graph
+from bench.formats import read_graph, toml_file
 from bench.formats.npz import read_topology
 from bench.formats.one_dsfm import read_bundle
 from bench.papers.layout import load_layout
 from bench.papers.published import read_published
-from bench.plan import Job, Plan, encode
-from bench.problem import Instance, Problem
-from bench.store import Store
+from bench.plugins import registry, selection
+from bench.storage.store import Store
+from bench.suite.experiment import load_suite
+from bench.suite.plan import Job, Plan, encode
 
 Read = Callable[[bytes, Path], object]
 
@@ -209,7 +210,7 @@ POINT = "1 2 3\n255 255 255\n1 0 1 0.5 0.5\n"
 BUNDLE = f"# Bundle file v0.3\n3 1\n{CAMERA}{UNREGISTERED}{CAMERA}{POINT}"
 PLUGIN = """from dataclasses import dataclass
 from typing import Literal
-from bench.registry import method
+from bench.plugins.registry import method
 
 @method("mine", title="Mine", cite="", requires=("numpy",), install="", robust=True, max_cameras=5)
 @dataclass(frozen=True)
@@ -237,7 +238,7 @@ def _project_file(package: str, name: str) -> bytes:
 
 def _layouts() -> tuple[bytes, ...]:
     """Every table and figure of the layouts, a file each."""
-    texts = [_project_file("bench.papers", f"{name}.toml") for name in named.names("bench.papers")]
+    texts = [_project_file("bench.papers", f"{name}.toml") for name in toml_file.names("bench.papers")]
     return tuple(part for text in texts for part in re.split(rb"\n(?=\[\w+\]\n)", text) if part.startswith(b"["))
 
 
@@ -263,7 +264,7 @@ PARSERS: dict[str, Parser] = {
     ),
     "topology": Parser((_npz(edges=EDGES, n=4),), _file("graph.npz", read_topology), "npz"),
     "suite": Parser(
-        tuple(_project_file("bench.suites", f"{name}.toml") for name in named.names("bench.suites")),
+        tuple(_project_file("bench.suite.suites", f"{name}.toml") for name in toml_file.names("bench.suite.suites")),
         _file("suite.toml", _suite),
     ),
     "layout": Parser(

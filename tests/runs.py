@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import so3
-from bench.arrays import save_estimate
-from bench.plan import Job, Plan
-from bench.problem import Checkpoint, Estimate, Floats, Instance
-from bench.store import Store, digest
+from bench.core import so3
+from bench.core.problem import Checkpoint, Estimate, Floats, Instance
+from bench.storage.arrays import save_estimate
+from bench.storage.store import Store, digest
+from bench.suite.plan import Job, Plan
 from tests.graphs import random_edges, simulated
 
 Errors = Callable[[np.random.Generator, int], Floats]  # degrees (n,)

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Floats, Instance, Ints
-from bench.registry import Dataset, Source
+from bench.core import so3
+from bench.core.problem import Floats, Instance, Ints
+from bench.plugins.registry import Dataset, Source
 
 UNREGISTERED = "1 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
 

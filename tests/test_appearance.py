@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 from commands import bench
 
-from bench.errors import InputError
-from bench.reporting import appearance, style
+from bench.core.errors import InputError
+from bench.reporting import appearance
 from bench.reporting.appearance import Appearance, MethodLook, find, read, using
-from bench.reporting.grid import grids
-from bench.scoring.errors import summary
+from bench.reporting.figures import style
+from bench.reporting.tables.grid import grids
+from bench.scoring.metrics.errors import summary
 
 STYLE = """
 width = "double"

@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 from scenes import write_scene
 
-from bench.datasets._archive import damaged
-from bench.datasets._download import Archive
+from bench.core.errors import InputError
+from bench.datasets._files.archive import damaged
+from bench.datasets._files.download import Archive
 from bench.datasets.one_dsfm import FILES, OneDSfM
-from bench.errors import InputError
 
 INSIDE = "home/wilsonkl/projects/SfM_Init/datasets"
 
@@ -304,7 +304,7 @@ def test_a_header_that_claims_gigabytes_is_not_read(server: Server, tmp_path: Pa
 
 
 def test_a_bomb_is_given_up(server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench.datasets._archive._MOST_BYTES", 2**20)
+    monkeypatch.setattr("bench.datasets._files.archive._MOST_BYTES", 2**20)
     for name in ("Alamo/EGs.txt", "Alamo/unwanted.txt"):
         server.data = headers(member(f"{INSIDE}/{name}", 2**24), tail=b"\0" * 2**24)
         assert "unpacks to more than 1048576 bytes" in refusal(server, tmp_path / "out")
@@ -314,7 +314,7 @@ def test_a_bomb_is_given_up(server: Server, tmp_path: Path, monkeypatch: pytest.
 
 
 def test_a_million_members_are_given_up(server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench.datasets._archive._MOST_MEMBERS", 10)
+    monkeypatch.setattr("bench.datasets._files.archive._MOST_MEMBERS", 10)
     server.data = headers(*(member(f"x/{k}") for k in range(12)))
     assert "more than 10 members" in refusal(server, tmp_path / "out")
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from commands import bench
 
-from bench.bibliography import BENCHMARK, bibliography, cite_keys, read_entries, references
-from bench.conformance import check_method
-from bench.errors import InputError
-from bench.registry import catalog
+from bench.core.errors import InputError
+from bench.plugins.references import BENCHMARK, bibliography, cite_keys, read_entries, references
+from bench.plugins.registry import catalog
+from bench.running.conformance import check_method
 
 BIBLIOGRAPHY = Path(__file__).parent.parent / "methods" / "references.bib"
 PLUGINS = [*catalog("method"), *catalog("dataset")]

@@ -8,11 +8,11 @@ from commands import bench
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench import budget
-from bench.budget import Budget
-from bench.errors import InputError
-from bench.experiment import load_suite
-from bench.runner import Options, Run
+from bench.core.errors import InputError
+from bench.running.run import Options, Run
+from bench.suite import budget
+from bench.suite.budget import Budget
+from bench.suite.experiment import load_suite
 
 
 @pytest.mark.parametrize(

@@ -7,19 +7,20 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated
 
-from bench import so3
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
 from bench.datasets.erdos_renyi import ErdosRenyi
-from bench.methods import _camera_kernels, _smallest
-from bench.methods._certificate import certificate_matrix, chordal_cost, multipliers
-from bench.methods._neighbours import neighbours_of
-from bench.methods._smallest import smallest_eigenspace
+from bench.methods._lib.graph.neighbours import neighbours_of
+from bench.methods._lib.linear import smallest
+from bench.methods._lib.linear.certificate import certificate_matrix, chordal_cost, multipliers
+from bench.methods._lib.linear.smallest import smallest_eigenspace
+from bench.methods._lib.loops import camera_kernels
 from bench.methods.bcd import BCD
 from bench.methods.maks import MAKS
 from bench.methods.rcd import RCD
 from bench.methods.sdp import SDP
 from bench.methods.shonan import Shonan
 from bench.methods.staircase import Staircase
-from bench.problem import Estimate, Floats, Problem
 
 RNG = np.random.default_rng(0)
 SMALL = random_edges(20, 0.3)
@@ -96,7 +97,7 @@ def test_coordinate_steps_are_projections_and_know_their_gain() -> None:
     for k in range(problem.n):
         wanted[k] = so3.project(measurements[3 * k : 3 * k + 3] @ wanted.reshape(-1, 3))
     before = chordal_cost(problem, rotations)
-    _camera_kernels.rotation_sweep(seen.first, seen.cameras, seen.rotations, rotations, gain)
+    camera_kernels.rotation_sweep(seen.first, seen.cameras, seen.rotations, rotations, gain)
     np.testing.assert_allclose(rotations, wanted, atol=1e-12)
     assert before - chordal_cost(problem, rotations) == pytest.approx(2 * gain[0])
 
@@ -114,7 +115,7 @@ def test_a_coordinate_step_survives_singular_sums(kind: str) -> None:
         matrix *= 1e-200 if kind == "tiny" else 0.0
     rotations = np.stack([np.eye(3), np.eye(3)])
     first, neighbours = np.array([0, 1, 1], dtype=np.int32), np.array([1], dtype=np.int32)
-    _camera_kernels.rotation_sweep(first, neighbours, matrix[None], rotations, np.empty(1))
+    camera_kernels.rotation_sweep(first, neighbours, matrix[None], rotations, np.empty(1))
     assert np.abs(rotations[0] @ rotations[0].T - np.eye(3)).max() < 1e-12
     assert np.linalg.det(rotations[0]) == pytest.approx(1)
     if kind in ("reflection", "rank two"):
@@ -130,11 +131,11 @@ def test_the_smallest_eigenvalues_are_those_of_lapack(
     measurements = problem.block_matrix()
     rotations = Staircase(max_iterations=1).solve(problem, RNG).rotations
     matrix = certificate_matrix(measurements, multipliers(measurements, rotations))
-    monkeypatch.setattr(_smallest, "SMALL", 10**6 if path == "lapack" else 0)
-    monkeypatch.setattr(_smallest, "DENSE", 10**6 if path == "dense factors" else 0)
-    monkeypatch.setattr(_smallest, "DENSE_SHARE", 1.0)
-    monkeypatch.setattr(_smallest, "FACTORED", 0 if path == "products" else 10**6)
-    monkeypatch.setattr(_smallest, "NARROW", 0.0)
+    monkeypatch.setattr(smallest, "SMALL", 10**6 if path == "lapack" else 0)
+    monkeypatch.setattr(smallest, "DENSE", 10**6 if path == "dense factors" else 0)
+    monkeypatch.setattr(smallest, "DENSE_SHARE", 1.0)
+    monkeypatch.setattr(smallest, "FACTORED", 0 if path == "products" else 10**6)
+    monkeypatch.setattr(smallest, "NARROW", 0.0)
     values, vectors = smallest_eigenspace(matrix, np.random.default_rng(1).standard_normal((3 * problem.n, 3)))
     np.testing.assert_allclose(values, np.linalg.eigvalsh(matrix.toarray())[:3], atol=1e-8)
     np.testing.assert_allclose(matrix @ vectors, vectors * values, atol=1e-3)

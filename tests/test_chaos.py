@@ -7,8 +7,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from bench.results import score
-from bench.runner import Options, Run
+from bench.running.run import Options, Run
+from bench.scoring.results import score
 
 LIMIT_S, LIMIT_GIB, WORKERS = 4.0, 0.25, 2
 PLUGIN = Path(__file__).with_name("chaos_plugin.py")

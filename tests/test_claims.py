@@ -8,7 +8,7 @@ import pytest
 from commands import bench
 from scenes import write_scene
 
-from bench.errors import InputError
+from bench.core.errors import InputError
 from bench.papers.layout import load_layout
 
 LAYOUT = """

@@ -11,14 +11,14 @@ import pandas as pd
 import pytest
 from commands import bench
 
-from bench import so3
-from bench.arrays import load_estimate
-from bench.comparison import Comparison, compare
-from bench.errors import InputError
-from bench.reporting.compared import comparison_grid, verdict
-from bench.results import Results
-from bench.scoring.errors import summary
-from bench.scoring.ratio import Ratio, mean_ratio, time_ratio
+from bench.core import so3
+from bench.core.errors import InputError
+from bench.reporting.tables.compared import comparison_grid, verdict
+from bench.scoring.comparison import Comparison, compare
+from bench.scoring.inference.ratio import Ratio, mean_ratio, time_ratio
+from bench.scoring.metrics.errors import summary
+from bench.scoring.results import Results
+from bench.storage.arrays import load_estimate
 
 CAMERAS = 60
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from bench import registry
-from bench.conformance import CHECKS, check_method
-from bench.methods._starts import SEEDED
+from bench.methods._lib.graph.starts import SEEDED
+from bench.plugins import registry
+from bench.running.conformance import CHECKS, check_method
 
 METHODS = registry.catalog("method")
 CONFIGURATIONS = [

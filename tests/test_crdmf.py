@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
-from bench.errors import InputError
-from bench.methods import _dmf_thin
-from bench.methods._crdmf_dense import SymmetricFactorization
+from bench.core.errors import InputError
+from bench.core.problem import Ints
+from bench.methods._lib.dmf import dmf_thin
+from bench.methods._lib.dmf.crdmf_dense import SymmetricFactorization
 from bench.methods.crdmf import CRDMF, agrees_with_tree, reweighted
 from bench.methods.spectral import Spectral
-from bench.problem import Ints
-from bench.registry import Source, catalog
+from bench.plugins.registry import Source, catalog
 
 NOISY = random_edges(60, 0.5)
 GRAPHS = {
@@ -79,14 +79,14 @@ def test_relabelling_edge_order_and_direction_do_not_matter() -> None:
 def test_weighted_blocks_are_in_the_thin_gradient() -> None:
     """A block of weight zero might as well not be there; doubled weights double the gradient."""
     problem, _ = simulated(random_edges(9, 0.6), noise_deg=20)
-    observed, generator = _dmf_thin.Observed.of(problem), rng(1)
+    observed, generator = dmf_thin.Observed.of(problem), rng(1)
     left = generator.standard_normal((9, 9)).astype(np.float32)
     weights = generator.uniform(0.5, 2, len(observed.neighbour)).astype(np.float32)
 
-    def sums(*weights: _dmf_thin.Single) -> tuple[float, np.ndarray]:
+    def sums(*weights: dmf_thin.Single) -> tuple[float, np.ndarray]:
         filled = np.empty((9, 9), np.float32)
         graph = observed.first, observed.neighbour, observed.blocks
-        return _dmf_thin.edge_kernel(3, "l1")(*graph, left, left.T.copy(), np.float32(0.1), filled, *weights), filled
+        return dmf_thin.edge_kernel(3, "l1")(*graph, left, left.T.copy(), np.float32(0.1), filled, *weights), filled
 
     plain_cost, plain = sums()
     ones_cost, ones = sums(np.ones_like(weights))

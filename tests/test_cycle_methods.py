@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
-from bench import so3
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
 from bench.datasets.erdos_renyi import ErdosRenyi
-from bench.methods._cemp import corruption_levels
-from bench.methods._simplex_descent import consistent_levels
-from bench.methods._starts import start_rotations
-from bench.methods._triangles import Triangles, codegrees, sample_triangles
+from bench.methods._lib.descent.simplex_descent import consistent_levels
+from bench.methods._lib.graph.cemp import corruption_levels
+from bench.methods._lib.graph.starts import start_rotations
+from bench.methods._lib.graph.triangles import Triangles, codegrees, sample_triangles
 from bench.methods.cemp import CEMP
 from bench.methods.desc import DESC
 from bench.methods.l1_irls import L1IRLS
 from bench.methods.mpls import MPLS
 from bench.methods.spectral import Spectral
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import Source
-from bench.scoring.roc import roc_auc
+from bench.plugins.registry import Source
+from bench.scoring.metrics.roc import roc_auc
 
 ALL = 10**6
 METHODS = [CEMP(), CEMP(solver="gcw"), MPLS(), DESC()]

@@ -7,11 +7,11 @@ import pytest
 from graphs import grid_edges, random_edges, simulated
 from scenes import load
 
-from bench import so3
+from bench.core import so3
+from bench.core.problem import Instance, Problem
 from bench.datasets.erdos_renyi import ErdosRenyi
 from bench.datasets.folded import Folded
-from bench.problem import Instance, Problem
-from bench.scoring.cycles import agreeing_share, sample_cycles
+from bench.scoring.metrics.cycles import agreeing_share, sample_cycles
 
 
 def test_every_triangle_is_found_with_its_residual() -> None:

@@ -16,9 +16,9 @@ from commands import bench
 from dask import config as dask_config
 from distributed import Client, LocalCluster
 
-from bench.errors import InputError
-from bench.execution import dask
-from bench.runner import Options, Run
+from bench.core.errors import InputError
+from bench.running.engines import dask
+from bench.running.run import Options, Run
 
 KILLED_JOBS = int(os.environ.get("ROTSYNC_KILLED_JOBS", "60"))
 TIMES = ("solve_s", "wall_s", "peak_mib", "log", "finished", "provenance")
@@ -273,9 +273,9 @@ import os, signal, time
 from dataclasses import dataclass
 import numpy as np
 import psutil
-from bench import so3
-from bench.problem import Instance, Problem
-from bench.registry import Source, dataset, method
+from bench.core import so3
+from bench.core.problem import Instance, Problem
+from bench.plugins.registry import Source, dataset, method
 
 
 @method("killer", title="Killer", deterministic=False)

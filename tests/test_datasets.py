@@ -9,16 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import load, the_source, write_scene
 
-from bench import so3
-from bench.datasets import _folders
-from bench.datasets._noise import Noise
-from bench.datasets._statistics import hardness
+from bench.core import so3
+from bench.core.errors import InputError
+from bench.core.problem import Problem
+from bench.datasets._files import folders
+from bench.datasets._simulated.noise import Noise
+from bench.datasets._simulated.statistics import hardness
 from bench.datasets.erdos_renyi import ErdosRenyi
 from bench.datasets.one_dsfm import FETCH, SCENES, OneDSfM
 from bench.datasets.pose_graph import PoseGraph, propagated
-from bench.errors import InputError
-from bench.problem import Problem
-from bench.registry import Missing, Source
+from bench.plugins.registry import Missing, Source
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -183,7 +183,7 @@ def test_the_users_folder_comes_first(tmp_path: Path, elsewhere: Path, monkeypat
     for k, place in enumerate(places):
         write_scene(place / "Alamo", images=5 + k, unregistered=())
         if k == 1:
-            monkeypatch.setenv(_folders.VARIABLE, str(place))
+            monkeypatch.setenv(folders.VARIABLE, str(place))
         cameras.append(load(OneDSfM(scene="Alamo"), place if k == 2 else None).problem.n)
     assert cameras == [4, 5, 6]
 
@@ -193,7 +193,7 @@ def test_unknown_scenes_and_folders_are_refused(tmp_path: Path, monkeypatch: pyt
         list(OneDSfM(scene="Elis_Island").sources(None, 0))
     with pytest.raises(InputError, match="the data folder is not a folder"):
         list(OneDSfM().sources(tmp_path / "none", 0))
-    monkeypatch.setenv(_folders.VARIABLE, str(tmp_path / "none"))
+    monkeypatch.setenv(folders.VARIABLE, str(tmp_path / "none"))
     with pytest.raises(InputError, match="ROTSYNC_DATA_DIR is not a folder"):
         list(OneDSfM().sources(None, 0))
 

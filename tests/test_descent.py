@@ -8,18 +8,18 @@ from graphs import errors_deg, grid_edges, random_edges, simulated
 from scenes import load
 from scipy import integrate, stats
 
-from bench import so3
+from bench.core import so3
+from bench.core.problem import Floats, Problem
 from bench.datasets.one_dsfm import OneDSfM
-from bench.methods._gtsam import rotations_of, values_of
-from bench.methods._iterate import Iterate, floored
-from bench.methods._losses import LOSSES, MAGSAC_CUT, LossName
-from bench.methods._starts import Start, start_rotations
+from bench.methods._lib.descent.iterate import Iterate, floored
+from bench.methods._lib.descent.losses import LOSSES, MAGSAC_CUT, LossName
+from bench.methods._lib.graph.starts import Start, start_rotations
+from bench.methods._lib.gtsam_values import rotations_of, values_of
 from bench.methods.l1_irls import L1IRLS
 from bench.methods.lie_averaging import LieAveraging
 from bench.methods.robust_lm import RobustLM
 from bench.methods.spanning_tree import tree_rotations
 from bench.methods.spectral import Spectral
-from bench.problem import Floats, Problem
 
 RNG = np.random.default_rng(0)
 DENSE = random_edges(60, 0.4)

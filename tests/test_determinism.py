@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from test_conformance import CONFIGURATIONS
 
-from bench import registry
-from bench.conformance import check_method
-from bench.execution.local import LocalEngine
 from bench.execution.supervise import Limits
-from bench.experiment import Cell
-from bench.runner import Options, Run
-from bench.selection import format_selection
-from bench.store import Store, digest
+from bench.plugins import registry
+from bench.plugins.selection import format_selection
+from bench.running.conformance import check_method
+from bench.running.engines.local import LocalEngine
+from bench.running.run import Options, Run
+from bench.storage.store import Store, digest
+from bench.suite.experiment import Cell
 
 PROBLEM = "erdos-renyi[n=16,missing=0.5,outliers=0.2]"
 LIES = ("seed", "system", "global", "hash", "clock")
@@ -97,8 +97,8 @@ LIAR = '''
 import os, time
 from dataclasses import dataclass
 import numpy as np
-from bench import so3
-from bench.registry import method
+from bench.core import so3
+from bench.plugins.registry import method
 
 
 @method("liar", title="Liar", exact_to_deg=1e-3)

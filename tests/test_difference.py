@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bench.scoring.difference import holm, paired, unpaired
+from bench.scoring.inference.difference import holm, paired, unpaired
 
 RNG = np.random.default_rng(0)
 A, B = RNG.normal(1.0, 0.5, 12), RNG.normal(1.3, 1.5, 9)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
+from bench.core.errors import InputError
+from bench.core.problem import Checkpoint, Ints
 from bench.datasets.one_dsfm import OneDSfM
-from bench.errors import InputError
-from bench.methods import _dmf_thin
-from bench.methods._dmf_dense import DenseFactorization
+from bench.methods._lib.dmf import dmf_thin
+from bench.methods._lib.dmf.dmf_dense import DenseFactorization
 from bench.methods.dmf_synch import DMFSynch
 from bench.methods.spectral import Spectral
-from bench.problem import Checkpoint, Ints
-from bench.registry import Source, catalog
+from bench.plugins.registry import Source, catalog
 
 NOISY = random_edges(60, 0.5)
 RING = np.array([[k, k + 1] for k in range(29)] + [[0, 29]], dtype=np.int32)
@@ -79,10 +79,10 @@ def test_a_wider_product_still_gives_rotations() -> None:
 
 
 @pytest.mark.parametrize("loss", ["l1", "l2", "l1/2"])
-def test_the_edge_kernel_is_the_gradient_of_the_loss(loss: _dmf_thin.Loss) -> None:
+def test_the_edge_kernel_is_the_gradient_of_the_loss(loss: dmf_thin.Loss) -> None:
     """Against finite differences of the loss, written out with full matrices in double precision."""
     problem, _ = simulated(random_edges(9, 0.5), noise_deg=20)
-    observed, width, scale = _dmf_thin.Observed.of(problem), 4, 0.3
+    observed, width, scale = dmf_thin.Observed.of(problem), 4, 0.3
     left, right = rng(1).standard_normal((2, 9, 3 * width))
     seen = np.kron((problem.adjacency().toarray() + np.eye(9)), np.ones((3, 3)))
     measured = problem.block_matrix(diagonal=np.ones(9)).toarray()
@@ -98,7 +98,7 @@ def test_the_edge_kernel_is_the_gradient_of_the_loss(loss: _dmf_thin.Loss) -> No
         return float(2 * np.sqrt(scale) * ((squares[present] + scale**2) ** 0.25).sum())
 
     sums = np.empty((9, 3 * width), np.float32)
-    _dmf_thin.edge_kernel(width, loss)(
+    dmf_thin.edge_kernel(width, loss)(
         observed.first,
         observed.neighbour,
         observed.blocks,

@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from bench import so3
-from bench.problem import Floats
-from bench.scoring.alignment import RULES
-from bench.scoring.dominance import clearly_better
-from bench.scoring.errors import camera_errors
+from bench.core import so3
+from bench.core.problem import Floats
+from bench.scoring.inference.dominance import clearly_better
+from bench.scoring.metrics.alignment import RULES
+from bench.scoring.metrics.errors import camera_errors
 
 N = 200
 Errors = dict[str, dict[str, list[Floats]]]

@@ -11,16 +11,16 @@ from test_archive import Server, fetch, refusal, tree
 from test_archive import _no_proxy as _no_proxy
 from test_archive import server as server
 
-from bench.datasets import _download
-from bench.datasets._download import Archive
+from bench.core.errors import InputError
+from bench.datasets._files import download
+from bench.datasets._files.download import Archive
 from bench.datasets.one_dsfm import OneDSfM
-from bench.errors import InputError
 
 
 def test_a_server_that_falls_silent_is_given_up(
     server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(_download, "_TIMEOUT", 0.2)
+    monkeypatch.setattr(download, "_TIMEOUT", 0.2)
     server.stalls_after = 1000
     message = refusal(server, tmp_path / "out")
     assert "nothing came for 0.2 s" in message
@@ -32,7 +32,7 @@ def test_a_server_that_falls_silent_is_given_up(
 
 
 def test_a_server_that_does_not_answer_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_download, "_TIMEOUT", 0.2)
+    monkeypatch.setattr(download, "_TIMEOUT", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         archive = Archive(f"http://127.0.0.1:{silent.getsockname()[1]}/datasets.tar.gz", "0" * 64, 10)
         with pytest.raises(InputError, match=r"nothing came for 0\.2 s; 0 of 10 bytes are here"):

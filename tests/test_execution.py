@@ -8,11 +8,11 @@ import numpy as np
 import psutil
 import pytest
 
-from bench import registry
+from bench.core.problem import Problem
 from bench.execution import launch
 from bench.execution.single import Answer, SingleSolver
 from bench.execution.supervise import Limits
-from bench.problem import Problem
+from bench.plugins import registry
 
 LIMITS = Limits(seconds=30, memory_gib=1.0)
 

@@ -12,15 +12,15 @@ from commands import bench
 from graphs import random_edges, simulated
 from scenes import write_scene
 
-from bench import so3
-from bench.errors import InputError
+from bench.core import so3
+from bench.core.errors import InputError
+from bench.core.problem import Checkpoint, Estimate, Floats, Instance
 from bench.papers.explain import Explained, Setting, candidates, cells, explain, switches, together
+from bench.papers.items.scenes import SceneTable
 from bench.papers.layout import load_layout
 from bench.papers.measure import CHOICES, Answer, Measure
 from bench.papers.published import read_published
-from bench.papers.scenes import SceneTable
-from bench.problem import Checkpoint, Estimate, Floats, Instance
-from bench.reporting.explained import explained_grid
+from bench.papers.tables.explained import explained_grid
 
 METHODS = ("ours", "theirs")
 BASE = Setting("ours", "truth-subgraph", Measure())

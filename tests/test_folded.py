@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import load, part_of, the_source
 
-from bench import so3
+from bench.core import so3
+from bench.core.errors import InputError
+from bench.core.problem import Floats
 from bench.datasets.folded import Folded
-from bench.errors import InputError
 from bench.methods.l1_irls import L1IRLS
 from bench.methods.spectral import Spectral
-from bench.problem import Floats
-from bench.scoring.folds import Fold, border, find_folds, shared_folds
+from bench.scoring.metrics.folds import Fold, border, find_folds, shared_folds
 
 A_QUARTER = Folded(outliers=0.0)  # every outlier is an edge across, which tells who is in the part
 TURN = so3.exp(np.radians(25) * np.array([0.6, 0, 0.8]))

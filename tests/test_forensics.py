@@ -10,19 +10,19 @@ from graphs import random_edges, simulated
 from runs import Made, made_run
 from scenes import load, part_of
 
-from bench import so3
+from bench.core import so3
+from bench.core.problem import Floats, Instance, Problem
 from bench.datasets.folded import Folded
-from bench.problem import Floats, Instance, Problem
-from bench.reporting.report import graph
-from bench.reporting.report.case import Case, Solved
-from bench.reporting.report.embed import compact
-from bench.reporting.report.page import render
-from bench.reporting.report.realign import under_every_rule
-from bench.reporting.report.scene import sections, sections_of
-from bench.reporting.report.section import Section
-from bench.results import Results, score
-from bench.runner import Options, Run
-from bench.store import Store
+from bench.reporting.html import graph
+from bench.reporting.html.case import Case, Solved
+from bench.reporting.html.embed import compact
+from bench.reporting.html.page import render
+from bench.reporting.html.realign import under_every_rule
+from bench.reporting.html.scene import sections, sections_of
+from bench.reporting.html.section import Section
+from bench.running.run import Options, Run
+from bench.scoring.results import Results, score
+from bench.storage.store import Store
 
 PLACE = ("toy", "P", "all")
 TURNED = "Parts of the scene that are turned as one piece"

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenes import bundle_camera, egs_line, write_scene
 
-from bench import so3
-from bench.errors import InputError
+from bench.core import so3
+from bench.core.errors import InputError
 from bench.formats import read_graph, rotations_writer, write_rotations
 from bench.formats.one_dsfm import read_bundle
 

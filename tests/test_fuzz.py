@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from mutation import mutated
 from parsers import PARSERS
 
-from bench.errors import InputError
-from bench.experiment import load_suite
+from bench.core.errors import InputError
 from bench.formats import read_graph
 from bench.formats.npz import read_topology
 from bench.papers.layout import load_layout
-from bench.registry import catalog
+from bench.plugins.registry import catalog
+from bench.suite.experiment import load_suite
 
 
 def read(name: str, data: bytes, folder: Path) -> None:

@@ -8,7 +8,7 @@ from graphs import errors_deg, random_edges, simulated, transformed
 from scenes import load
 
 from bench.datasets.one_dsfm import OneDSfM
-from bench.methods._starts import Start
+from bench.methods._lib.graph.starts import Start
 from bench.methods.gnc import GNC, SURROGATES, GncLoss
 from bench.methods.gtsam_gnc import GtsamGNC
 from bench.methods.l1_irls import L1IRLS

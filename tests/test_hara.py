@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
-from bench import so3
-from bench.methods._all_triangles import AllTriangles
-from bench.methods._hierarchical_tree import chordal_l1_mean, hierarchical_tree, support_levels
+from bench.core import so3
+from bench.core.problem import Ints, Problem
+from bench.methods._lib.graph.all_triangles import AllTriangles
+from bench.methods._lib.graph.hierarchical_tree import chordal_l1_mean, hierarchical_tree, support_levels
 from bench.methods.hara import HARA
 from bench.methods.l1_irls import L1IRLS
 from bench.methods.spanning_tree import SpanningTree
-from bench.problem import Ints, Problem
-from bench.registry import Source
+from bench.plugins.registry import Source
 
 RNG = np.random.default_rng(0)  # the method draws nothing from it
 DENSE = random_edges(60, 0.4)

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from bench.reporting.appearance import Appearance, using
-from bench.reporting.plots import figures
+from bench.reporting.figures.plots import figures
 from bench.reporting.present import render_table
-from bench.results import Results
-from bench.scoring.errors import summary
-from bench.scoring.statistics import confidence_interval
+from bench.scoring.inference.statistics import confidence_interval
+from bench.scoring.metrics.errors import summary
+from bench.scoring.results import Results
 
 RANKINGS = {"rank-probabilities", "critical-difference", "performance-profile-error", "performance-profile-time"}
 

@@ -16,10 +16,10 @@ import pandas as pd
 import psutil
 import pytest
 
-from bench.plan import Job
-from bench.results import score
-from bench.runner import Options, Run
-from bench.store import Store
+from bench.running.run import Options, Run
+from bench.scoring.results import score
+from bench.storage.store import Store
+from bench.suite.plan import Job
 
 KILLS = int(os.environ.get("BENCH_KILLS", "4"))
 PLUGIN = Path(__file__).with_name("chaos_plugin.py")
@@ -30,7 +30,7 @@ MOST_S = 2.5  # from when the jobs begin to the kill: the fork server takes one,
 HARNESS = f"""
 import sys
 from pathlib import Path
-from bench.runner import Options, Run
+from bench.running.run import Options, Run
 plugins = (Path(sys.argv[2]), Path({str(PLUGIN)!r}))
 run = Run("quick", {METHODS}, {DATASETS}, Options(out=Path(sys.argv[1]), plugins=plugins, jobs=2, seeds=2))
 run.prepare()

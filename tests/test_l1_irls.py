@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
-from bench import so3
-from bench.methods import _edge_kernels, _laplacian
-from bench.methods._laplacian import LaplacianSolver
-from bench.methods._losses import LOSSES
+from bench.core import so3
+from bench.core.problem import Ints
+from bench.methods._lib.descent.losses import LOSSES
+from bench.methods._lib.linear import laplacian
+from bench.methods._lib.linear.laplacian import LaplacianSolver
+from bench.methods._lib.loops import edge_kernels
 from bench.methods.l1_irls import L1IRLS, LossName
 from bench.methods.spectral import Spectral
-from bench.problem import Ints
 
 RNG = np.random.default_rng(0)  # the method draws nothing from it
 DENSE = random_edges(60, 0.4)
@@ -42,9 +43,9 @@ def test_residuals_are_those_of_the_matrices() -> None:
     problem, _ = simulated(DENSE, outliers=1.0)
     cameras = so3.random(np.random.default_rng(1), problem.n)
     vectors, angles, measured = np.empty((problem.m, 3)), np.empty(problem.m), np.empty((problem.m, 4))
-    _edge_kernels.quaternions(problem.rotations, measured)
+    edge_kernels.quaternions(problem.rotations, measured)
     np.testing.assert_allclose(so3.from_quaternion(measured), problem.rotations, atol=1e-14)
-    _edge_kernels.edge_residuals(problem.edges, measured, so3.to_quaternion(cameras), vectors, angles)
+    edge_kernels.edge_residuals(problem.edges, measured, so3.to_quaternion(cameras), vectors, angles)
     i, j = problem.edges.T
     wanted = so3.log(np.swapaxes(cameras[i], -1, -2) @ problem.rotations @ cameras[j])
     np.testing.assert_allclose(vectors, wanted, atol=1e-12)
@@ -57,10 +58,10 @@ def test_quaternions_and_angles_of_half_turns_and_of_none() -> None:
         rotations = so3.exp(angle * axes)
         edges = np.stack([np.zeros(4), np.arange(1, 5)], axis=1).astype(np.int32)
         measured, vectors, angles = np.empty((4, 4)), np.empty((4, 3)), np.empty(4)
-        _edge_kernels.quaternions(rotations, measured)
+        edge_kernels.quaternions(rotations, measured)
         np.testing.assert_allclose(so3.from_quaternion(measured), rotations, atol=1e-14)
         cameras = np.tile([1.0, 0, 0, 0], (5, 1))
-        _edge_kernels.edge_residuals(edges, measured, cameras, vectors, angles)
+        edge_kernels.edge_residuals(edges, measured, cameras, vectors, angles)
         np.testing.assert_allclose(angles, angle, atol=1e-14, rtol=1e-6)
         np.testing.assert_allclose(so3.exp(vectors), rotations, atol=1e-14)
 
@@ -70,7 +71,7 @@ def test_turning_cameras() -> None:
     cameras, steps = so3.random(rng, 20), rng.standard_normal((20, 3))
     steps[0] = 0
     turned = so3.to_quaternion(cameras)
-    _edge_kernels.turn(steps, turned)
+    edge_kernels.turn(steps, turned)
     np.testing.assert_allclose(so3.from_quaternion(turned), cameras @ so3.exp(steps), atol=1e-14)
 
 
@@ -91,7 +92,7 @@ def test_laplacian_solutions_are_least_squares(edges: Ints) -> None:
 
 
 def test_large_graphs_are_solved_by_conjugate_gradients_to_the_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_laplacian, "LARGE", 200)
+    monkeypatch.setattr(laplacian, "LARGE", 200)
     problem, _ = simulated(random_edges(250, 0.2))
     rng = np.random.default_rng(1)
     weights, vectors = rng.uniform(0.1, 2, problem.m), rng.standard_normal((problem.m, 3))
@@ -100,14 +101,14 @@ def test_large_graphs_are_solved_by_conjugate_gradients_to_the_tolerance(monkeyp
         found = LaplacianSolver(problem, tolerance).solve(weights, vectors)
         error = np.linalg.norm(found - exact) / np.linalg.norm(exact)
         assert 1e-9 < error < 3 * tolerance
-    monkeypatch.setattr(_laplacian, "MOST_PRODUCTS", 1)
+    monkeypatch.setattr(laplacian, "MOST_PRODUCTS", 1)
     np.testing.assert_allclose(LaplacianSolver(problem, 1e-4).solve(weights, vectors), exact, atol=1e-12)
 
 
 def test_large_graphs_are_solved_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, truth = simulated(random_edges(250, 0.2), noise_deg=3, outliers=0.3)
     exact = L1IRLS().solve(problem, RNG)
-    monkeypatch.setattr(_laplacian, "LARGE", 200)
+    monkeypatch.setattr(laplacian, "LARGE", 200)
     found = L1IRLS().solve(problem, RNG)
     assert not np.array_equal(found.rotations, exact.rotations)
     assert errors_deg(found.rotations, exact.rotations).max() < 0.05

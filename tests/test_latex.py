@@ -10,23 +10,24 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bench.papers.claims import Claims
 from bench.papers.computed import Computed
-from bench.papers.curves import CurvePlot
+from bench.papers.items.claims import Claims
+from bench.papers.items.curves import CurvePlot
+from bench.papers.items.properties import PropertyTable
+from bench.papers.items.scenes import SceneTable
+from bench.papers.items.speedup import Speedup
 from bench.papers.layout import load_layout
-from bench.papers.properties import PropertyTable
 from bench.papers.published import read_published
-from bench.papers.scenes import SceneTable
-from bench.papers.speedup import Speedup
-from bench.reporting import claims, paper, style
+from bench.papers.tables import claims, paper
+from bench.papers.tables.side_by_side import side_by_side
 from bench.reporting.appearance import Appearance, using
-from bench.reporting.captions import captions
-from bench.reporting.grid import Grid, grids
-from bench.reporting.latex import latex, latex_escape
-from bench.reporting.plots import figures
-from bench.reporting.side_by_side import side_by_side
-from bench.results import Results
-from bench.scoring.errors import summary
+from bench.reporting.figures import style
+from bench.reporting.figures.captions import captions
+from bench.reporting.figures.plots import figures
+from bench.reporting.tables.grid import Grid, grids
+from bench.reporting.tables.latex import latex, latex_escape
+from bench.scoring.metrics.errors import summary
+from bench.scoring.results import Results
 
 DOCUMENT = r"""\documentclass[10pt,twocolumn,letterpaper]{article}
 \usepackage[margin=0.67in]{geometry}

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
-from bench import so3
-from bench.methods._davidson import block_laplacian, smallest_eigenspace
+from bench.core import so3
+from bench.core.problem import Floats, Ints, Problem
+from bench.methods._lib.linear.davidson import block_laplacian, smallest_eigenspace
 from bench.methods.martinec_pajdla import MartinecPajdla, laplacian_rotations
 from bench.methods.quaternion import Quaternion
 from bench.methods.spectral import PRECISE
-from bench.problem import Floats, Ints, Problem
 
 RNG = np.random.default_rng(0)  # only random starts draw from it
 SMALL = random_edges(20, 0.3)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from graphs import errors_deg, random_edges, simulated, transformed
 
+from bench.core.problem import Floats, Problem
 from bench.methods import r_godec
 from bench.methods.nuclear_norm import NuclearNorm, Program
 from bench.methods.r_godec import RGoDec
 from bench.methods.spectral import Spectral
-from bench.problem import Floats, Problem
 
 RNG = np.random.default_rng(0)  # the methods here draw nothing from it
 EDGES = random_edges(50, 0.5)

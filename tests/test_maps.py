@@ -9,15 +9,15 @@ import pytest
 from commands import bench
 from graphs import simulated
 
-from bench.errors import InputError
+from bench.core.errors import InputError
+from bench.core.problem import Instance
 from bench.maps.adaptive import Bools, Tally, boundary, every_sample, farthest, next_samples
 from bench.maps.axes import Axis, parse_axis, parse_cells
 from bench.maps.bounds import limits
 from bench.maps.criterion import Criterion, clairvoyant_median_deg, median_of_all, parse_criterion
-from bench.problem import Instance
-from bench.registry import catalog
-from bench.reporting.maps import draw, grid_of, successes
-from bench.scoring.theory import cramer_rao_rms_deg
+from bench.maps.drawing import draw, grid_of, successes
+from bench.plugins.registry import catalog
+from bench.scoring.metrics.theory import cramer_rao_rms_deg
 
 SHAPE = (12, 12)
 SEEDS = 3
@@ -171,10 +171,10 @@ PLUGIN = '''
 """A method that breaks at a known line of a dataset that has one."""
 from dataclasses import dataclass
 import numpy as np
-from bench import so3
-from bench.problem import Instance, Problem
-from bench.registry import Source, dataset, method
-from bench.seeds import stream
+from bench.core import so3
+from bench.core.problem import Instance, Problem
+from bench.plugins.registry import Source, dataset, method
+from bench.core.seeds import stream
 
 
 @method("brittle", title="Brittle")

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from graphs import errors_deg, random_edges, simulated, transformed
 
-from bench import so3
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Problem
 from bench.datasets.one_dsfm import OneDSfM
-from bench.methods._certificate import chordal_cost, smallest_eigenvalue
+from bench.methods._lib.linear.certificate import chordal_cost, smallest_eigenvalue
 from bench.methods.colmap import Colmap
 from bench.methods.sdp import SDP
 from bench.methods.shonan import Shonan
-from bench.problem import Estimate, Floats, Problem
-from bench.registry import Source
+from bench.plugins.registry import Source
 
 Peer = SDP | Shonan | Colmap
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
-from bench import so3
-from bench.methods._eigenspace import leading_eigenspace
+from bench.core import so3
+from bench.core.problem import Floats, Ints, Problem
+from bench.methods._lib.linear.eigenspace import leading_eigenspace
 from bench.methods.spanning_tree import SpanningTree, tree_edges
 from bench.methods.spectral import Spectral, spectral_rotations
-from bench.problem import Floats, Ints, Problem
 
 RNG = np.random.default_rng(0)  # the methods here draw nothing from it
 COMPLETE = random_edges(120, 1.0)

@@ -35,9 +35,9 @@ FORBIDDEN_CALLS = {
 }
 # Where a module is imported whose name is not written in the source.
 PLUGIN_IMPORTS = {
-    ("bench/registry.py", "importlib.import_module"),
-    ("bench/registry.py", "spec.loader.exec_module"),
-    ("bench/registry.py", "importlib.util.spec_from_file_location"),
+    ("bench/plugins/registry.py", "importlib.import_module"),
+    ("bench/plugins/registry.py", "spec.loader.exec_module"),
+    ("bench/plugins/registry.py", "importlib.util.spec_from_file_location"),
     ("bench/execution/child.py", "importlib.import_module"),
     ("bench/execution/server.py", "importlib.import_module"),
 }

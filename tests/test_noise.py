@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bench import so3
-from bench.datasets._noise import Noise, sample
-from bench.problem import Floats
+from bench.core import so3
+from bench.core.problem import Floats
+from bench.datasets._simulated.noise import Noise, sample
 
 SIZE = 20_000
 

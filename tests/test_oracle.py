@@ -5,18 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import so3
-from bench.problem import Checkpoint, Estimate
-from bench.results import score
-from bench.runner import Options, Run
-from bench.scoring.oracle import curve
+from bench.core import so3
+from bench.core.problem import Checkpoint, Estimate
+from bench.running.run import Options, Run
+from bench.scoring.metrics.oracle import curve
+from bench.scoring.results import score
 
 WANDERER = '''
 """A method that passes by a good answer on its way."""
 from dataclasses import dataclass
 import numpy as np
-from bench.problem import Checkpoint, Estimate
-from bench.registry import method
+from bench.core.problem import Checkpoint, Estimate
+from bench.plugins.registry import method
 
 
 @method("wanderer", title="Wanderer")

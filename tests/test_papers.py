@@ -10,16 +10,16 @@ import pytest
 from commands import bench
 from scenes import write_scene
 
-from bench.errors import InputError
+from bench.core.errors import InputError
 from bench.papers.computed import Computed
-from bench.papers.curves import CurvePlot
+from bench.papers.items.curves import CurvePlot
+from bench.papers.items.properties import PropertyTable
+from bench.papers.items.scenes import SceneTable
 from bench.papers.layout import load_layout, paper_names
-from bench.papers.properties import PropertyTable
 from bench.papers.published import methods_of, read_published
-from bench.papers.scenes import SceneTable
-from bench.registry import catalog
-from bench.reporting.paper import property_grid, render, scene_grid
-from bench.results import Results
+from bench.papers.tables.paper import property_grid, render, scene_grid
+from bench.plugins.registry import catalog
+from bench.scoring.results import Results
 
 LAYOUT = """
 title = "A paper"

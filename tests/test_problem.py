@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bench import so3
-from bench.errors import InputError
-from bench.problem import Problem, oriented
+from bench.core import so3
+from bench.core.errors import InputError
+from bench.core.problem import Problem, oriented
 
 EYE = np.eye(3)
 

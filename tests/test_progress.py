@@ -16,10 +16,10 @@ import pytest
 from commands import bench
 from rich.console import Console
 
-from bench.execution.pace import Pace, Task, remaining_s, span
-from bench.plan import Job
-from bench.reporting import board as board_module
-from bench.reporting.board import Board
+from bench.running.progress import board as board_module
+from bench.running.progress.board import Board
+from bench.running.progress.pace import Pace, Task, remaining_s, span
+from bench.suite.plan import Job
 
 SIZES = (1e4, 1e5, 1e6)
 
@@ -284,8 +284,8 @@ def test_ctrl_c_on_a_terminal_ends_with_130_and_keeps_what_is_done(faulty_plugin
 
 
 def test_of_earlier_runs_every_method_is_read_and_no_timing_run(faulty_plugin: Path, tmp_path: Path) -> None:
-    from bench.past import Past
-    from bench.runner import Options, Run
+    from bench.running.progress.past import Past
+    from bench.running.run import Options, Run
 
     faults = ("fine", "raise", "skip", "slow")
     bench(*arguments(faulty_plugin, tmp_path / "a", *faults))

@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from bench.scoring.blocks import Blocks, blocks
-from bench.scoring.profiles import performance_profiles, profile_frame
-from bench.scoring.ranking import critical_difference, friedman_p, rank_frame, rank_probabilities, ranks
+from bench.scoring.inference.blocks import Blocks, blocks
+from bench.scoring.inference.profiles import performance_profiles, profile_frame
+from bench.scoring.inference.ranking import critical_difference, friedman_p, rank_frame, rank_probabilities, ranks
 
 RNG = np.random.default_rng(0)
 

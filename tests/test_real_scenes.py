@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 
 import bench
-from bench.results import Results, score
-from bench.store import Store
+from bench.scoring.results import Results, score
+from bench.storage.store import Store
 
 pytestmark = pytest.mark.real_data
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from bench import registry
-from bench.errors import InputError
+from bench.core.errors import InputError
+from bench.plugins import registry
 
-HEADER = "from dataclasses import dataclass\nfrom typing import Literal\nfrom bench.registry import method\n"
+HEADER = "from dataclasses import dataclass\nfrom typing import Literal\nfrom bench.plugins.registry import method\n"
 
 
 def write(path: Path, name: str, body: str = "", requires: str = "()") -> Path:
@@ -115,7 +115,7 @@ def test_every_built_in_plugin_imports() -> None:
 def test_listing_imports_nothing_heavy() -> None:
     heavy = ("scipy", "torch", "gtsam", "cvxpy", "pycolmap", "numba", "pandas", "matplotlib", "pooch")
     code = (
-        "import sys; from bench import registry; [registry.catalog(k) for k in ('method', 'dataset')]; "
+        "import sys; from bench.plugins import registry; [registry.catalog(k) for k in ('method', 'dataset')]; "
         f"print([m for m in {heavy!r} if m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

@@ -6,16 +6,16 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from bench.reporting.report import figures, ranks, reversals, words
-from bench.reporting.report.embed import compact
-from bench.reporting.report.leaderboard import ALL_SCENES, leaderboard
-from bench.reporting.report.page import render, write_report
-from bench.reporting.report.realign import under_every_rule
-from bench.reporting.report.section import anchor
-from bench.reporting.report.standing import standings
-from bench.reporting.rows import Entry, Scene, Value
-from bench.reporting.rows import scenes as scenes_of
-from bench.results import score
+from bench.reporting.html import figures, ranks, reversals, words
+from bench.reporting.html.embed import compact
+from bench.reporting.html.leaderboard import ALL_SCENES, leaderboard
+from bench.reporting.html.page import render, write_report
+from bench.reporting.html.realign import under_every_rule
+from bench.reporting.html.section import anchor
+from bench.reporting.html.standing import standings
+from bench.reporting.tables.rows import Entry, Scene, Value
+from bench.reporting.tables.rows import scenes as scenes_of
+from bench.scoring.results import score
 from tests.commands import bench
 from tests.runs import Made, made_run
 

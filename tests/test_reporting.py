@@ -6,11 +6,12 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from bench.errors import InputError
-from bench.reporting import plots, style, tables
-from bench.reporting.console import console_blocks
-from bench.reporting.latex import latex_escape
-from bench.scoring.errors import summary
+from bench.core.errors import InputError
+from bench.reporting.figures import plots, style
+from bench.reporting.tables import render as tables
+from bench.reporting.tables.console import console_blocks
+from bench.reporting.tables.latex import latex_escape
+from bench.scoring.metrics.errors import summary
 
 HOSTILE = "a_b%&<script>|$x$#{}\\~^*[y]"
 PLACE = ("1dsfm", "Ellis_Island", "truth-subgraph")

@@ -12,9 +12,9 @@ import pytest
 from commands import bench
 from scenes import write_scene
 
-from bench.errors import InputError
-from bench.rerun import prepare
-from bench.runner import Options, Run
+from bench.core.errors import InputError
+from bench.running.replay import prepare
+from bench.running.run import Options, Run
 
 
 def recorded(plugin: Path, out: Path, method: str, dataset: str = "toy", **options: Any) -> Path:

@@ -8,11 +8,11 @@ import pandas as pd
 import pytest
 from scipy.integrate import trapezoid
 
-from bench.reporting import tables
-from bench.reporting.rows import area
-from bench.results import Results, score
-from bench.runner import Options, Run
-from bench.scoring.roc import roc_auc, roc_curve
+from bench.reporting.tables import render
+from bench.reporting.tables.rows import area
+from bench.running.run import Options, Run
+from bench.scoring.metrics.roc import roc_auc, roc_curve
+from bench.scoring.results import Results, score
 
 
 def test_is_the_share_of_pairs_in_the_right_order() -> None:
@@ -68,19 +68,19 @@ def test_is_a_column_of_the_results(results: Results) -> None:
     by_method = results.frame.groupby("method")["roc_auc"]
     assert by_method.get_group("spanning-tree").between(0.4, 1).all()
     assert by_method.get_group("spectral").isna().all()
-    back = pd.read_csv(io.StringIO(tables.render(results.frame, results.ties, (), "csv")[0]))
+    back = pd.read_csv(io.StringIO(render.render(results.frame, results.ties, (), "csv")[0]))
     np.testing.assert_array_equal(back["roc_auc"], results.frame["roc_auc"])
 
 
 @pytest.mark.parametrize("style", ["console", "markdown", "latex"])
 def test_is_shown_where_it_is_known(results: Results, style: str) -> None:
     tree = results.frame[results.frame["method"] == "spanning-tree"]
-    text, _ = tables.render(results.frame, results.ties, (), style)
+    text, _ = render.render(results.frame, results.ties, (), style)
     assert "AUC" in text
     assert "area under the ROC curve" in " ".join(text.split())
     for _, rows in tree.groupby("instance"):
         assert area(rows["roc_auc"].mean()) in text
-    without, _ = tables.render(results.frame.assign(roc_auc=np.nan), results.ties, (), style)
+    without, _ = render.render(results.frame.assign(roc_auc=np.nan), results.ties, (), style)
     assert "AUC" not in without
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.errors import InputError
-from bench.results import score
-from bench.runner import Options, Run
-from bench.store import Store
+from bench.core.errors import InputError
+from bench.running.run import Options, Run
+from bench.scoring.results import score
+from bench.storage.store import Store
 
 
 def planned(plugin: Path, out: Path, methods: list[str], datasets: list[str] | None = None, **options: object) -> Run:

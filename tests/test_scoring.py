@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from bench import so3
-from bench.errors import InputError
-from bench.problem import Problem
-from bench.scoring.alignment import RULES, align
-from bench.scoring.errors import camera_errors, edge_metrics, summary
-from bench.scoring.seed_ties import tied_by_seed
-from bench.scoring.statistics import confidence_interval, seed_half_width, tie_groups, tied
+from bench.core import so3
+from bench.core.errors import InputError
+from bench.core.problem import Problem
+from bench.scoring.inference.seed_ties import tied_by_seed
+from bench.scoring.inference.statistics import confidence_interval, seed_half_width, tie_groups, tied
+from bench.scoring.metrics.alignment import RULES, align
+from bench.scoring.metrics.errors import camera_errors, edge_metrics, summary
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bench.errors import InputError
-from bench.selection import Selection, format_selection, parse
+from bench.core.errors import InputError
+from bench.plugins.selection import Selection, format_selection, parse
 
 
 def test_grid_is_a_cross_product() -> None:

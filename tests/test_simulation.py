@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from bench.scoring.ratio import error_ratio
-from bench.scoring.resampling import FLOOR_DEG
-from bench.scoring.statistics import tie_groups
+from bench.scoring.inference.ratio import error_ratio
+from bench.scoring.inference.resampling import FLOOR_DEG
+from bench.scoring.inference.statistics import tie_groups
 
 SEEDS, CAMERAS = 10, 40
 LUCK = 0.05  # of a method on a seed, as a standard deviation of its logarithm

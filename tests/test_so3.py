@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from bench import so3
+from bench.core import so3
 
 vectors = arrays(float, (4, 3), elements=st.floats(-10, 10))
 EXTREMES = np.array([[0, 0, 0], [1e-300, 0, 0], [1e-9, 0, 0], [np.pi, 0, 0], [0, np.pi - 1e-9, 0], [0, 0, 3.0]])

@@ -15,15 +15,15 @@ import pytest
 from commands import bench
 from conftest import FAULTY
 
-from bench import migration
-from bench.doctor import examine, repair
-from bench.errors import InputError
-from bench.merge import merge
-from bench.plan import Job, Plan, decode, encode
-from bench.results import score
-from bench.runner import Options, Run
-from bench.scores import scores_of
-from bench.store import Store
+from bench.core.errors import InputError
+from bench.running.run import Options, Run
+from bench.scoring.cache import scores_of
+from bench.scoring.results import score
+from bench.storage import migration
+from bench.storage.doctor import examine, repair
+from bench.storage.merge import merge
+from bench.storage.store import Store
+from bench.suite.plan import Job, Plan, decode, encode
 
 METHODS = ["faulty[fault=[fine,random,raise]]"]
 

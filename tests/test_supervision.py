@@ -17,13 +17,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench import registry
-from bench.arrays import save_estimate
-from bench.execution import launch, outcome, processes, supervise
+from bench.core import outcome
+from bench.core.problem import Estimate, Problem
+from bench.execution import launch, processes, supervise
 from bench.execution.output import LARGEST_RESULT, UnusableError, read_output
 from bench.execution.single import Answer, SingleSolver
 from bench.execution.supervise import Limits
-from bench.problem import Estimate, Problem
+from bench.plugins import registry
+from bench.storage.arrays import save_estimate
 
 PLUGIN = Path(__file__).with_name("chaos_plugin.py")
 TRIANGLE = Problem(3, np.array([(0, 1), (0, 2), (1, 2)]), np.tile(np.eye(3), (3, 1, 1)))

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
-from bench import so3
-from bench.methods import _geodesic_kernels
-from bench.methods._certificate import chordal_cost, smallest_eigenvalue
+from bench.core import so3
+from bench.core.problem import Floats, Ints, Problem
+from bench.methods._lib.linear.certificate import chordal_cost, smallest_eigenvalue
+from bench.methods._lib.loops import geodesic_kernels
 from bench.methods.tg_mcmc import TGMCMC
-from bench.problem import Floats, Ints, Problem
 
 GRAPHS = {"dense": random_edges(40, 0.4), "sparse": random_edges(60, 0.06), "grid": grid_edges(4, 8)}
 EVERY_GRAPH = pytest.mark.parametrize("edges", GRAPHS.values(), ids=GRAPHS)
@@ -21,7 +21,7 @@ def rng(seed: int = 0) -> np.random.Generator:
 def energy_and_forces(problem: Problem, cameras: Floats) -> tuple[float, Floats]:
     forces, energy = np.empty_like(cameras), np.empty(1)
     measured = so3.to_quaternion(problem.rotations)
-    _geodesic_kernels.bingham_forces(problem.edges, measured, cameras, forces, energy)
+    geodesic_kernels.bingham_forces(problem.edges, measured, cameras, forces, energy)
     return float(energy[0]), forces
 
 
@@ -45,7 +45,7 @@ def test_the_energy_is_an_eighth_of_the_chordal_cost() -> None:
 def test_a_step_without_forces_follows_a_great_circle() -> None:
     camera, velocity = np.array([[1.0, 0, 0, 0]]), np.array([[0, 0.3, 0, 0.4]])
     still = np.zeros((1, 4))
-    _geodesic_kernels.geodesic_step(camera, velocity, still, np.ones(1), still, 1.0, 2.0)
+    geodesic_kernels.geodesic_step(camera, velocity, still, np.ones(1), still, 1.0, 2.0)
     np.testing.assert_allclose(camera, [[np.cos(1), 0.6 * np.sin(1), 0, 0.8 * np.sin(1)]], atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(velocity), 0.5, atol=1e-12)
     np.testing.assert_allclose((camera * velocity).sum(), 0, atol=1e-12)
@@ -59,9 +59,9 @@ def test_at_a_constant_temperature_the_samples_have_the_bingham_density() -> Non
     velocities, forces, energy = np.zeros((2, 4)), np.zeros((2, 4)), np.zeros(1)
     generator, keep, squares = rng(3), 0.9, []
     for step in range(40_000):
-        _geodesic_kernels.bingham_forces(edge.edges, measured, cameras, forces, energy)
+        geodesic_kernels.bingham_forces(edge.edges, measured, cameras, forces, energy)
         kicks = np.sqrt((1 - keep**2) * noise**2 / 2) * generator.standard_normal((2, 4))
-        _geodesic_kernels.geodesic_step(cameras, velocities, forces, np.ones(2), kicks, keep, 0.2)
+        geodesic_kernels.geodesic_step(cameras, velocities, forces, np.ones(2), kicks, keep, 0.2)
         if step > 100:
             squares.append(4 * energy[0])  # the squared residual angle, sine taken for the angle
     assert np.sqrt(np.mean(squares) / 3) == pytest.approx(noise, rel=0.1)

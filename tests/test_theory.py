@@ -5,14 +5,20 @@ import pytest
 from graphs import grid_edges, random_edges, simulated
 from scenes import load
 
-from bench.datasets import _noise
+from bench.core.errors import InputError
+from bench.core.problem import Problem
+from bench.datasets._simulated import noise
 from bench.datasets.erdos_renyi import ErdosRenyi
-from bench.errors import InputError
 from bench.methods.l1_irls import L1IRLS
 from bench.methods.spectral import Spectral
-from bench.problem import Problem
-from bench.scoring.errors import camera_errors
-from bench.scoring.theory import NOISES, cramer_rao_rms_deg, cramer_rao_variances, efficient_mean_deg, information
+from bench.scoring.metrics.errors import camera_errors
+from bench.scoring.metrics.theory import (
+    NOISES,
+    cramer_rao_rms_deg,
+    cramer_rao_variances,
+    efficient_mean_deg,
+    information,
+)
 
 
 def bound(problem: Problem, noise: str = "tangent", noise_deg: float = 1.0) -> float:
@@ -42,7 +48,7 @@ def test_information_of_tangent_noise_to_second_order() -> None:
 def test_information_of_langevin_noise_agrees_with_its_samples(noise_deg: float) -> None:
     """It is -E[Laplacian of log f] / 3 too, and the trace is an eigenfunction: Laplacian of trace = -2 trace."""
     kappa = 0.5 / np.radians(noise_deg) ** 2
-    samples = _noise.sample("langevin", noise_deg, np.random.default_rng(0), 200_000)
+    samples = noise.sample("langevin", noise_deg, np.random.default_rng(0), 200_000)
     trace = np.trace(samples, axis1=1, axis2=2).mean()
     assert information("langevin", noise_deg) == pytest.approx(2 * kappa * trace / 3, rel=0.02)
 
@@ -106,7 +112,7 @@ def test_what_has_no_bound_is_refused(noise: str, noise_deg: float, message: str
 
 @pytest.mark.parametrize("noise", NOISES)
 @pytest.mark.parametrize("noise_deg", [1.0, 10.0])
-def test_least_squares_reaches_the_bound(noise: _noise.Noise, noise_deg: float) -> None:
+def test_least_squares_reaches_the_bound(noise: noise.Noise, noise_deg: float) -> None:
     """Ratios of root mean squares over 50 draws have a standard error of about 1 %."""
     methods = {"l2": L1IRLS(loss="l2"), "spectral": Spectral(), "l1": L1IRLS(loss="l1")}
     squares = dict.fromkeys([*methods, "bound"], 0.0)

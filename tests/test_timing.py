@@ -7,19 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.arrays import load_problem, save_estimate
-from bench.errors import InputError
-from bench.execution import outcome, timing
+from bench.core import outcome
+from bench.core.errors import InputError
+from bench.core.outcome import Outcome
+from bench.core.problem import Estimate
 from bench.execution.child import Request
-from bench.execution.outcome import Outcome
 from bench.execution.output import ESTIMATE_FILE
-from bench.experiment import load_suite, suite_names
-from bench.problem import Estimate
-from bench.reporting import tables
-from bench.reporting.rows import exact_seconds
-from bench.results import score
-from bench.runner import Options, Run
-from bench.scoring.timing import speedup
+from bench.reporting.tables import render
+from bench.reporting.tables.rows import exact_seconds
+from bench.running.engines import timing
+from bench.running.run import Options, Run
+from bench.scoring.metrics.speedup import speedup
+from bench.scoring.results import score
+from bench.storage.arrays import load_problem, save_estimate
+from bench.suite.experiment import load_suite, suite_names
 
 METHODS = ["faulty[fault=[fine,random,raise]]"]
 
@@ -127,7 +128,7 @@ def test_the_table_compares_with_the_baseline(
     assert random["speedup"] == pytest.approx(12.0 / 5.0)
     assert random["speedup_low"] == pytest.approx(2.0 / 2.0)
     assert random["speedup_high"] == pytest.approx(12.0 / 5.0)
-    text, _ = tables.render(results.frame, {}, ())
+    text, _ = render.render(results.frame, {}, ())
     line = next(line for line in text.splitlines() if "faulty[fault=random]" in line)
     assert re.search(r" 5\.00 +2\.00 +2\.4 \(1 to 2\.4\)", line)
     assert "median and least of 3 rounds" in " ".join(text.split())

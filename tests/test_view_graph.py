@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scenes import load, the_source
 
+from bench.core.errors import InputError
 from bench.datasets.one_dsfm import OneDSfM
 from bench.datasets.view_graph import ViewGraph
-from bench.errors import InputError
-from bench.registry import Missing, Source
+from bench.plugins.registry import Missing, Source
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

@@ -8,11 +8,11 @@ from graphs import errors_deg, random_edges, simulated, transformed
 from scenes import load
 from scipy.optimize import minimize
 
-from bench import so3
+from bench.core import so3
+from bench.core.problem import Floats, Problem
 from bench.datasets.one_dsfm import OneDSfM
-from bench.methods._starts import Start
+from bench.methods._lib.graph.starts import Start
 from bench.methods.weiszfeld import Weiszfeld
-from bench.problem import Floats, Problem
 
 RNG = np.random.default_rng(0)
 DENSE = random_edges(60, 0.4)

@@ -56,7 +56,7 @@ app.command("check")(check.check)
 
 def main() -> None:
     """Run the command line; bad input, or a disk that takes no more, is one sentence and exit code 2."""
-    from bench.errors import InputError
+    from bench.core.errors import InputError
 
     try:
         app(prog_name="python -m bench")

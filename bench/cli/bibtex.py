@@ -10,8 +10,8 @@ from bench.cli.options import RunFolder, run_folder
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bench.plan import Job
-    from bench.registry import Info
+    from bench.plugins.registry import Info
+    from bench.suite.plan import Job
 
 
 def bibtex(run: RunFolder) -> None:
@@ -19,8 +19,8 @@ def bibtex(run: RunFolder) -> None:
 
     What has none is said on standard error.
     """
-    from bench.bibliography import bibliography, cite_keys
-    from bench.store import Store
+    from bench.plugins.references import bibliography, cite_keys
+    from bench.storage.store import Store
 
     used = list(_used(Store.open(run_folder(run)).jobs()))
     typer.echo("\n\n".join(bibliography(used).values()))
@@ -31,7 +31,7 @@ def bibtex(run: RunFolder) -> None:
 
 def _used(jobs: "list[Job]") -> "Iterator[Info]":
     """Methods and datasets of the jobs, in their order; what is no longer there is said on standard error."""
-    from bench import registry, selection
+    from bench.plugins import registry, selection
 
     plugins = [path for path in dict.fromkeys(job.origin for job in jobs) if Path(path).is_file()]
     names = {

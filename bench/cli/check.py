@@ -14,9 +14,9 @@ def check(
     plugin: PluginOption = None,
 ) -> None:
     """Run the conformance checks on a method; exit code 1 when one fails."""
-    from bench import registry
-    from bench.conformance import check_method
-    from bench.errors import InputError
+    from bench.core.errors import InputError
+    from bench.plugins import registry
+    from bench.running.conformance import check_method
 
     chosen = registry.catalog(kind.value, plugin or []).select([selection])
     if len(chosen) != 1:

@@ -11,8 +11,8 @@ import typer
 from bench.cli.options import Align, AlignOption, ProtocolOption, run_folder
 
 if TYPE_CHECKING:
-    from bench.results import Results
-    from bench.store import Store
+    from bench.scoring.results import Results
+    from bench.storage.store import Store
 
 
 class CompareFormat(StrEnum):
@@ -37,13 +37,13 @@ def compare(
 
     Exit code 0: nothing is worse; 1: a method's error or time is, or a job no longer ends well; 2: bad input.
     """
-    from bench.comparison import compare as compared
-    from bench.errors import InputError
-    from bench.reporting.compared import comparison_grid, comparison_table, verdict
-    from bench.reporting.console import render_grid
-    from bench.reporting.grid import markdown
-    from bench.results import score
-    from bench.store import Store
+    from bench.core.errors import InputError
+    from bench.reporting.tables.compared import comparison_grid, comparison_table, verdict
+    from bench.reporting.tables.console import render_grid
+    from bench.reporting.tables.grid import markdown
+    from bench.scoring.comparison import compare as compared
+    from bench.scoring.results import score
+    from bench.storage.store import Store
 
     if not threshold >= 1:
         raise InputError(f"--threshold is a ratio of at least 1, such as 1.05, not {threshold:g}")

@@ -8,7 +8,7 @@ import typer
 from bench.cli.options import DataDirOption, Protocol, ProtocolOption
 
 if TYPE_CHECKING:
-    from bench.registry import Missing, Source
+    from bench.plugins.registry import Missing, Source
 
 app = typer.Typer(help="List, fetch, verify and inspect data.", no_args_is_help=True)
 
@@ -18,7 +18,7 @@ Name = Annotated[str, typer.Argument(metavar="DATASET", help="A selection, such 
 @app.command("list")
 def list_(name: Name = "1dsfm", data_dir: DataDirOption = None, protocol: ProtocolOption = None) -> None:
     """List the instances of a dataset, on disk or not, with the command that gets what is missing."""
-    from bench.registry import Missing
+    from bench.plugins.registry import Missing
 
     for source in _sources(name, data_dir, protocol):
         if isinstance(source, Missing):
@@ -32,7 +32,7 @@ def inspect(name: Name, data_dir: DataDirOption = None, protocol: ProtocolOption
     """Load the instances of a dataset and print what is known of them."""
     import numpy as np
 
-    from bench.registry import Missing
+    from bench.plugins.registry import Missing
 
     for source in _sources(name, data_dir, protocol):
         if isinstance(source, Missing):
@@ -81,7 +81,7 @@ def verify(name: Annotated[str, typer.Argument(metavar="DATASET")], data_dir: Da
 
 
 def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> "list[Source | Missing]":
-    from bench import registry
+    from bench.plugins import registry
 
     found = []
     for info, parameters in registry.catalog("dataset").select([name]):
@@ -92,8 +92,8 @@ def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> "li
 
 
 def _fetchable(name: str) -> Any:
-    from bench import registry
-    from bench.errors import InputError
+    from bench.core.errors import InputError
+    from bench.plugins import registry
 
     info = registry.catalog("dataset")[name]
     if not info.facts["fetchable"]:

@@ -17,9 +17,9 @@ def doctor(
 
     After --repair, the command that made the run makes again what was damaged.
     """
-    from bench import doctor as doctors
-    from bench.execution import outcome
-    from bench.store import ASIDE, Store
+    from bench.core import outcome
+    from bench.storage import doctor as doctors
+    from bench.storage.store import ASIDE, Store
 
     folder = run_folder(run)
     findings = doctors.examine(folder)

@@ -29,7 +29,7 @@ def list_(what: Annotated[What, typer.Argument()], plugin: PluginOption = None) 
 
 
 def _list_suites() -> None:
-    from bench.experiment import load_suite, suite_names
+    from bench.suite.experiment import load_suite, suite_names
 
     for name in suite_names():
         suite = load_suite(name)
@@ -48,7 +48,7 @@ def _list_papers() -> None:
 
 
 def _list_plugins(kind: str, plugins: list[Path]) -> None:
-    from bench import registry, selection
+    from bench.plugins import registry, selection
 
     found = registry.catalog(kind, plugins)
     for info in sorted(found, key=lambda info: info.name):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench.cli.options import Align, DataDirOption, PluginOption
-from bench.cli.progress import execute
+from bench.running.progress.live import execute
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,11 +53,11 @@ def map_(
     unsure. What is stored is not solved again: after Ctrl-C, the same command continues. An `n` and a `noise_deg`
     make an axis as well as `missing` and `outliers`.
     """
-    from bench.errors import InputError
+    from bench.core.errors import InputError
     from bench.maps.axes import parse_axis, parse_cells
     from bench.maps.criterion import parse_criterion
     from bench.maps.sweep import PhaseMap, Sweep, one_dataset
-    from bench.runner import RUNS_FOLDER, Options
+    from bench.running.run import RUNS_FOLDER, Options
 
     plugins = tuple(plugin or ())
     if budget_solves is not None and budget_solves < 1:
@@ -83,8 +83,8 @@ def map_(
 
 def _present(phase_map: "PhaseMap", folder: Path, full: bool) -> None:
     from bench.maps.bounds import limits
-    from bench.reporting.maps import draw, summary
-    from bench.reporting.style import save
+    from bench.maps.drawing import draw, summary
+    from bench.reporting.figures.style import save
 
     sweep = phase_map.sweep
     frame = phase_map.frame()
@@ -112,7 +112,7 @@ def _read(path: Path, phase_map: "PhaseMap") -> "pd.DataFrame":
     """Cells of another map, checked to be on the same axes."""
     import pandas as pd
 
-    from bench.errors import InputError
+    from bench.core.errors import InputError
 
     try:
         other = pd.read_csv(path)
@@ -131,7 +131,7 @@ def _tell_apart(phase_map: "PhaseMap", other: "pd.DataFrame") -> None:
     import numpy as np
 
     from bench.maps.adaptive import farthest
-    from bench.reporting.maps import successes
+    from bench.maps.drawing import successes
 
     axes = phase_map.sweep.x, phase_map.sweep.y
     ours, theirs = successes(phase_map.frame(), axes), successes(other, axes)

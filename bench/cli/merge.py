@@ -15,7 +15,7 @@ def merge(
     What cannot be read is named and left out; the command that made the run then runs it again.
     """
     from bench.cli.options import run_folder
-    from bench.merge import merge as merged_into
+    from bench.storage.merge import merge as merged_into
 
     done = merged_into([run_folder(run) for run in runs], into)
     for sentence in done.told:

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Estimate, Problem
-from bench.registry import method
+from bench.core import so3
+from bench.core.problem import Estimate, Problem
+from bench.plugins.registry import method
 
 
 @method("{name}", title="{title}")
@@ -55,7 +55,7 @@ def new(
     into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder for the file.")] = Path(),
 ) -> None:
     """Write a working method of one file, to be replaced by yours."""
-    from bench.errors import InputError
+    from bench.core.errors import InputError
 
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
         raise InputError(

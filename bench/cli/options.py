@@ -83,7 +83,7 @@ def wear(given: Path | None = None, width: str | None = None) -> None:
 
 def run_folder(given: Path) -> Path:
     """Folder of a run from its path or its name."""
-    from bench.runner import RUNS_FOLDER
+    from bench.running.run import RUNS_FOLDER
 
     named = RUNS_FOLDER / given
     return named if not given.exists() and named.is_dir() else given

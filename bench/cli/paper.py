@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench.cli.options import Align, DataDirOption, Format, StyleOption, wear
-from bench.cli.progress import execute
+from bench.running.progress.live import execute
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from bench.experiment import Suite
     from bench.papers.computed import Computed
     from bench.papers.layout import Item, Layout
-    from bench.reporting.grid import Grid
-    from bench.runner import Options, Run
+    from bench.reporting.tables.grid import Grid
+    from bench.running.run import Options, Run
+    from bench.suite.experiment import Suite
 
 
 def paper(
@@ -49,11 +49,11 @@ def paper(
     With --explain, alignment, protocol, statistic, angle and method are toggled one at a time instead, and the one
     that moves our number closest to the published one is named.
     """
-    from bench.papers.curves import CurvePlot
+    from bench.papers.items.curves import CurvePlot
+    from bench.papers.items.properties import PropertyTable
     from bench.papers.layout import load_layout
-    from bench.papers.properties import PropertyTable
-    from bench.reporting import paper as tables
-    from bench.runner import RUNS_FOLDER, Options
+    from bench.papers.tables import paper as tables
+    from bench.running.run import RUNS_FOLDER, Options
 
     wear(style)
     layout = load_layout(paper)
@@ -72,7 +72,7 @@ def paper(
     grid, frame = _compared(chosen, layout, computed, rule, format)
     _print(grid, frame, format)
     if isinstance(chosen, CurvePlot):
-        from bench.reporting.bands import draw
+        from bench.papers.bands import draw
 
         _save(draw(chosen, frame, rule, grid.notes), frame, folder / "plots", item)
 
@@ -81,13 +81,13 @@ def _compared(
     item: "Item", layout: "Layout", computed: "Computed", rule: str, format: Format
 ) -> "tuple[Grid, pd.DataFrame]":
     """The table of an item, and the data frame behind it."""
-    from bench.papers.claims import Claims
-    from bench.papers.curves import CurvePlot
+    from bench.papers.items.claims import Claims
+    from bench.papers.items.curves import CurvePlot
+    from bench.papers.items.scenes import SceneTable
+    from bench.papers.items.speedup import Speedup
     from bench.papers.published import read_published
-    from bench.papers.scenes import SceneTable
-    from bench.papers.speedup import Speedup
-    from bench.reporting import claims, paper
-    from bench.reporting.side_by_side import side_by_side
+    from bench.papers.tables import claims, paper
+    from bench.papers.tables.side_by_side import side_by_side
 
     if isinstance(item, SceneTable):
         frame = item.compare(read_published(layout.folder, item.published), computed)
@@ -106,10 +106,10 @@ def _compared(
 
 def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Computed":
     """Run what is not done, then score the jobs of the item."""
-    from bench.papers.claims import Claims
     from bench.papers.computed import Computed
-    from bench.papers.speedup import Speedup
-    from bench.results import score
+    from bench.papers.items.claims import Claims
+    from bench.papers.items.speedup import Speedup
+    from bench.scoring.results import score
 
     runs, missing = _run(item.suites(name), name, options)
     if not runs:
@@ -123,7 +123,7 @@ def _computed(item: "Item", name: str, options: "Options", rule: str) -> "Comput
 
 def _run(suites: "Sequence[Suite]", name: str, options: "Options") -> "tuple[list[Run], list[str]]":
     """Run what is not done; the runs, and a sentence for what is not on disk."""
-    from bench.runner import NothingToRunError, Run
+    from bench.running.run import NothingToRunError, Run
 
     missing: list[str] = []
     runs = []
@@ -152,11 +152,11 @@ def _explain(
     format: Format,
 ) -> None:
     """Print which switch closes the gap of each cell."""
-    from bench.errors import InputError
+    from bench.core.errors import InputError
     from bench.papers.explain import cells, explain_cell, suites_of, together
+    from bench.papers.items.scenes import SceneTable
     from bench.papers.published import SCENE, read_published
-    from bench.papers.scenes import SceneTable
-    from bench.reporting.explained import explained_grid
+    from bench.papers.tables.explained import explained_grid
 
     if not isinstance(item, SceneTable):
         raise InputError("--explain takes a table of scenes, such as table1")
@@ -177,7 +177,7 @@ def _explain(
 
 
 def _print(grid: "Grid", frame: "pd.DataFrame", format: Format) -> None:
-    from bench.reporting.paper import render
+    from bench.papers.tables.paper import render
 
     width = shutil.get_terminal_size((120, 24)).columns
     text, notes = render(grid, frame, format.value, width=width, terminal=sys.stdout.isatty())
@@ -187,7 +187,7 @@ def _print(grid: "Grid", frame: "pd.DataFrame", format: Format) -> None:
 
 
 def _save(figure: "Figure", points: "pd.DataFrame", folder: Path, name: str) -> None:
-    from bench.reporting.style import save
+    from bench.reporting.figures.style import save
 
     paths = save(figure, folder, name)
     paths.append(folder / f"{name}.csv")

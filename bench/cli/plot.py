@@ -26,8 +26,8 @@ def plot(
     captions.tex.
     """
     from bench.reporting.present import write_plots
-    from bench.results import score
-    from bench.store import Store
+    from bench.scoring.results import score
+    from bench.storage.store import Store
 
     wear(style, width)
     folder = run_folder(run)

@@ -19,10 +19,10 @@ def report(
     The file needs no network: open it from disk, send it, print it. The report is about one alignment rule; the
     leaderboard has all of them, and the report says whether the choice changes the ranking.
     """
-    from bench.reporting.report.page import FILE_NAME, write_report
-    from bench.reporting.report.realign import under_every_rule
-    from bench.results import score
-    from bench.store import Store
+    from bench.reporting.html.page import FILE_NAME, write_report
+    from bench.reporting.html.realign import under_every_rule
+    from bench.scoring.results import score
+    from bench.storage.store import Store
 
     folder = run_folder(run)
     store = Store.open(folder)

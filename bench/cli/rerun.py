@@ -10,7 +10,7 @@ from bench.cli.options import DataDirOption, PluginOption
 
 if TYPE_CHECKING:
     from bench.execution.single import Answer
-    from bench.rerun import Repetition
+    from bench.running.replay import Repetition
 
 
 def rerun(
@@ -26,8 +26,8 @@ def rerun(
     What is no longer as it was (instance, source of the method, versions) is said. The exit code is 1 when the job
     ends differently, or with an estimate that is not bit-identical to the one in the record's run.
     """
-    from bench.rerun import prepare
-    from bench.selection import format_selection
+    from bench.plugins.selection import format_selection
+    from bench.running.replay import prepare
 
     ready = prepare(record, data_dir, plugin or [])
     job = ready.job
@@ -47,8 +47,8 @@ def _debugged(ready: "Repetition") -> "Answer":
     import pdb
     import traceback
 
-    from bench.execution import outcome
-    from bench.execution.outcome import Outcome
+    from bench.core import outcome
+    from bench.core.outcome import Outcome
 
     try:
         return ready.in_this_process()

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench.cli.options import Align, AlignOption, DataDirOption, Engine, PluginOption, ProtocolOption, Rerun, wear
-from bench.cli.progress import execute, foreseen
+from bench.running.progress.live import execute, foreseen
 
 if TYPE_CHECKING:
-    from bench.runner import Run
+    from bench.running.run import Run
 
 EPILOG = (
     "Examples: python -m bench run | "
@@ -74,7 +74,7 @@ def run(
     With --timing, the jobs are timed instead: the table has median and least solve time and the ratio to the
     baseline of the suite (by default its first method).
     """
-    from bench.runner import Options, Run
+    from bench.running.run import Options, Run
 
     options = Options(
         out=out,
@@ -115,7 +115,7 @@ def _intention(planned: "Run") -> str:
 
 
 def _list_cells(planned: "Run") -> None:
-    from bench.selection import format_selection
+    from bench.plugins.selection import format_selection
 
     todo = {cell.job.id for cell in planned.todo}
     for cell in planned.cells:
@@ -132,10 +132,10 @@ def _list_cells(planned: "Run") -> None:
 def _present(planned: "Run", align: Align) -> None:
     import shutil
 
+    from bench.reporting.html.page import FILE_NAME, write_report
+    from bench.reporting.html.realign import under_every_rule
     from bench.reporting.present import render_table, write_plots, write_tables
-    from bench.reporting.report.page import FILE_NAME, write_report
-    from bench.reporting.report.realign import under_every_rule
-    from bench.results import score
+    from bench.scoring.results import score
 
     wear()
     results = score(planned.store, align.value, planned.options.protocol, checkpoints=True)

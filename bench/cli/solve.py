@@ -19,11 +19,11 @@ def solve(
     plugin: PluginOption = None,
 ) -> None:
     """Solve one graph with one method and write the absolute rotations (world to camera)."""
-    from bench import registry
-    from bench.errors import InputError
+    from bench.core.errors import InputError
     from bench.execution.single import SingleSolver
     from bench.execution.supervise import Limits
     from bench.formats import read_graph, rotations_writer
+    from bench.plugins import registry
 
     write = rotations_writer(out)
     chosen = registry.catalog("method", plugin or []).select([method])

@@ -21,8 +21,8 @@ def table(
 ) -> None:
     """Print the table of a run; nothing is run. Notes go to standard error."""
     from bench.reporting.present import render_table
-    from bench.results import score
-    from bench.store import Store
+    from bench.scoring.results import score
+    from bench.storage.store import Store
 
     wear(style)
     results = score(Store.open(run_folder(run)), align.value, protocol.value if protocol else None, oracle=oracle)

@@ -23,16 +23,16 @@ from typing import Any
 
 import numpy as np
 
-from bench import registry
-from bench.arrays import load_problem, save_estimate
-from bench.errors import described
-from bench.execution import outcome
-from bench.execution.outcome import Outcome
+from bench.core import outcome
+from bench.core.errors import described
+from bench.core.outcome import Outcome
+from bench.core.problem import Estimate, Floats, Problem, Skipped
+from bench.core.seeds import stream
 from bench.execution.output import DISK_FULL, ESTIMATE_FILE, RESULT_FILE
 from bench.execution.threads import pin_threads
 from bench.execution.validate import kept_warnings, scalars, what_is_wrong
-from bench.problem import Estimate, Floats, Problem, Skipped
-from bench.seeds import stream
+from bench.plugins import registry
+from bench.storage.arrays import load_problem, save_estimate
 
 MANY = 10  # times repeat_s; a solution that takes longer is timed as it is, the first time
 
@@ -44,7 +44,7 @@ class Request:
     Parameters
     ----------
     problem
-        Path of an ``.npz`` written by `bench.arrays.save_problem`.
+        Path of an ``.npz`` written by `bench.storage.arrays.save_problem`.
     origin, method, parameters
         Module (or file) of the plug-in, its name, and the parameters given.
     seed

@@ -7,12 +7,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from bench import provenance
-from bench.errors import InputError
-from bench.execution import outcome
+from bench.core import outcome
+from bench.core.errors import InputError
+from bench.core.outcome import Outcome
+from bench.execution import provenance
 from bench.execution.child import Request
 from bench.execution.launch import Launcher, LaunchError, ServerLostError
-from bench.execution.outcome import Outcome
 from bench.execution.output import DISK_FULL, UnusableError, read_output
 from bench.execution.supervise import Limits, supervise
 

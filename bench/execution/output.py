@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from bench.execution import outcome
-from bench.execution.outcome import Outcome
+from bench.core import outcome
+from bench.core.outcome import Outcome
 
 ESTIMATE_FILE = "estimate.npz"
 RESULT_FILE = "result.json"

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.problem import Floats, Problem
-from bench.registry import method
+from bench.core.problem import Floats, Problem
+from bench.plugins.registry import method
 
 NAME = "rehearsal"
 

@@ -82,9 +82,9 @@ def _rehearse(threads: int) -> None:
     """Run a job in this process: what libraries put off to their first call is done once, not in every child."""
     import numpy as np
 
-    from bench.arrays import save_problem
+    from bench.core.problem import Problem
     from bench.execution import child, rehearsal
-    from bench.problem import Problem
+    from bench.storage.arrays import save_problem
 
     with tempfile.TemporaryDirectory(prefix="rotsync-") as folder:
         path = Path(folder, "problem.npz")

@@ -7,16 +7,16 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from bench.arrays import load_estimate, save_problem
-from bench.execution import outcome
+from bench.core import outcome
+from bench.core.outcome import Outcome
+from bench.core.problem import Estimate, Problem
 from bench.execution.child import Request
 from bench.execution.job import execute
 from bench.execution.launch import Launcher
-from bench.execution.outcome import Outcome
 from bench.execution.output import ESTIMATE_FILE
 from bench.execution.supervise import Limits
-from bench.problem import Estimate, Problem
-from bench.registry import Info
+from bench.plugins.registry import Info
+from bench.storage.arrays import load_estimate, save_problem
 
 Answer = tuple[Outcome, dict[str, Any], Estimate | None]
 

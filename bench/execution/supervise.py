@@ -4,9 +4,10 @@ import threading
 import time
 from dataclasses import dataclass
 
-from bench.execution import outcome, processes
+from bench.core import outcome
+from bench.core.outcome import Outcome
+from bench.execution import processes
 from bench.execution.launch import Child
-from bench.execution.outcome import Outcome
 
 SHORTEST_S, LONGEST_S = 0.01, 0.1  # between two looks at a child
 FASTEST_GIB_S = 4.0  # how fast a process may be thought to fill memory
@@ -23,7 +24,7 @@ class Limits:
     memory_gib
         Resident memory of the child and its descendants.
     budget
-        The name of these limits, where they were given by one; see `bench.budget`.
+        The name of these limits, where they were given by one; see `bench.suite.budget`.
     """
 
     seconds: float

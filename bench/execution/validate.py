@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from bench.errors import described
-from bench.problem import ROTATION_TOLERANCE, Checkpoint, Estimate, Problem
+from bench.core.errors import described
+from bench.core.problem import ROTATION_TOLERANCE, Checkpoint, Estimate, Problem
 
 MOST_TEXT = 100_000  # characters of all notes, and of the stop reason
 MOST_CHECKPOINTS = 100_000

@@ -6,7 +6,7 @@ file's own convention is, it is converted here to R_ij = R_i R_j^T.
 
 from pathlib import Path
 
-from bench.errors import InputError
+from bench.core.errors import InputError
 from bench.formats.graph import GraphFile
 from bench.formats.npz import read_npz
 from bench.formats.one_dsfm import read_egs, read_folder

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import so3
-from bench.errors import InputError
+from bench.core import so3
+from bench.core.errors import InputError
+from bench.core.problem import Floats, Problem, oriented
 from bench.formats.lines import Table
-from bench.problem import Floats, Problem, oriented
 
 Ids = NDArray[np.int64]
 Where = Callable[[int], str]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import InputError, shown
+from bench.core.errors import InputError, shown
 
 Row = tuple[int, list[str]]
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import npz
-from bench.errors import InputError
+from bench.core.errors import InputError
+from bench.core.problem import MOST_CAMERAS, Ints
+from bench.formats import archive
 from bench.formats.graph import GraphFile, Ids, build, check_pairs, first
-from bench.problem import MOST_CAMERAS, Ints
 
 
 def read_npz(path: Path) -> GraphFile:
@@ -55,7 +55,7 @@ def read_topology(path: Path) -> tuple[int, Ints]:
 
 def _load(path: Path, required: Mapping[str, str], optional: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
     """Arrays of an archive; `required` says which shape each that must be there has."""
-    arrays = npz.load(path, (*required, *optional))
+    arrays = archive.load(path, (*required, *optional))
     for name, shape in required.items():
         if name not in arrays:
             raise InputError(f"{path}: there is no array '{name}' in it; it must hold one of shape {shape}")

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.errors import InputError, shown
+from bench.core.errors import InputError, shown
+from bench.core.problem import Floats
 from bench.formats.graph import GraphFile, Ids, build, checked_rotations, distinct, first
 from bench.formats.lines import Table, check_plain, decode, parse, read_bytes, rows
-from bench.problem import Floats
 
 EDGES, COMPONENT, IMAGES, BUNDLE = "EGs.txt", "cc.txt", "list.txt", "gt_bundle.out"
 _EDGE_LAYOUT = "i j, the 9 entries of R_ij row by row, the 3 of the translation"

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import so3
-from bench.errors import InputError, shown
+from bench.core import so3
+from bench.core.errors import InputError, shown
+from bench.core.problem import Floats
 from bench.formats.graph import PRECISION, GraphFile, Ids, build, distinct, first
 from bench.formats.lines import Row, Table, parse, rows
-from bench.problem import Floats
 
 _INFORMATION = 21  # upper triangle of a 6 x 6 matrix
 _FLAT = {"VERTEX_SE2", "EDGE_SE2", "VERTEX2", "EDGE2"}

@@ -7,8 +7,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.errors import InputError
-from bench.problem import Floats
+from bench.core.errors import InputError
+from bench.core.problem import Floats
 
 Ids = NDArray[np.integer[Any]]
 Writer = Callable[[Ids, Floats], None]

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from bench.errors import InputError
+from bench.core.errors import InputError
+from bench.core.problem import Floats, Instance, Problem
 from bench.maps.criterion import clairvoyant_median_deg
-from bench.problem import Floats, Instance, Problem
 
 Drawn = tuple[tuple[int, int], Mapping[str, Any], Iterable[Instance]]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from bench.errors import InputError
-from bench.problem import Floats, Instance
-from bench.scoring.theory import efficient_median_deg, information
+from bench.core.errors import InputError
+from bench.core.problem import Floats, Instance
+from bench.scoring.metrics.theory import efficient_median_deg, information
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Criterion:
     ----------
     value
         The bound in degrees; or, where `relative`, as a multiple of the median error of an efficient estimator that
-        knows the outliers of the instance (`bench.scoring.theory.efficient_median_deg`).
+        knows the outliers of the instance (`bench.scoring.metrics.theory.efficient_median_deg`).
     relative
         Which of the two.
     """

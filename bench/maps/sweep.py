@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench import registry, selection
-from bench.errors import InputError
-from bench.execution import outcome
-from bench.experiment import Cell, Suite
+from bench.core import outcome
+from bench.core.errors import InputError
+from bench.core.problem import Instance
 from bench.maps.adaptive import Sample, Tally, every_sample, next_samples
 from bench.maps.axes import Axis
 from bench.maps.bounds import Drawn
 from bench.maps.criterion import Criterion, median_of_all
-from bench.problem import Instance
-from bench.registry import Info
-from bench.runner import Options, Run
-from bench.scoring.errors import camera_errors
+from bench.plugins import registry, selection
+from bench.plugins.registry import Info
+from bench.running.run import Options, Run
+from bench.scoring.metrics.errors import camera_errors
+from bench.suite.experiment import Cell, Suite
 
 if TYPE_CHECKING:
     import pandas as pd

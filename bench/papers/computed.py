@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bench import registry, selection
-from bench.errors import InputError
-from bench.plan import Job
-from bench.problem import Instance
-from bench.results import Results
+from bench.core.errors import InputError
+from bench.core.problem import Instance
+from bench.plugins import registry, selection
+from bench.scoring.results import Results
+from bench.suite.plan import Job
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench import selection
-from bench.errors import InputError
-from bench.execution import outcome
-from bench.experiment import Suite
+from bench.core import outcome
+from bench.core.errors import InputError
 from bench.papers.computed import extended, label, spelled
+from bench.papers.items.scenes import SceneTable
 from bench.papers.measure import CHOICES, Answer, Measure
 from bench.papers.published import SCENE, methods_of
-from bench.papers.scenes import SceneTable
-from bench.plan import Job
-from bench.registry import suggestion
-from bench.store import Store
+from bench.plugins import selection
+from bench.plugins.registry import suggestion
+from bench.storage.store import Store
+from bench.suite.experiment import Suite
+from bench.suite.plan import Job
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,15 +10,15 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from bench import named
-from bench.errors import InputError, shown
-from bench.papers.claims import Claims
-from bench.papers.curves import CurvePlot
-from bench.papers.properties import PropertyTable
-from bench.papers.scenes import SceneTable
-from bench.papers.speedup import Speedup
-from bench.registry import suggestion
-from bench.scoring.alignment import RULES
+from bench.core.errors import InputError, shown
+from bench.formats import toml_file
+from bench.papers.items.claims import Claims
+from bench.papers.items.curves import CurvePlot
+from bench.papers.items.properties import PropertyTable
+from bench.papers.items.scenes import SceneTable
+from bench.papers.items.speedup import Speedup
+from bench.plugins.registry import suggestion
+from bench.scoring.metrics.alignment import RULES
 
 Item = SceneTable | PropertyTable | CurvePlot | Claims | Speedup
 PAPERS = "bench.papers"
@@ -67,7 +67,7 @@ class Layout:
 
 def paper_names() -> list[str]:
     """Names of the papers whose layouts come with the project."""
-    return named.names(PAPERS)
+    return toml_file.names(PAPERS)
 
 
 def load_layout(name: str) -> Layout:
@@ -78,7 +78,7 @@ def load_layout(name: str) -> Layout:
     InputError
         Where there is no such layout, or the file is not one.
     """
-    stem, content = named.read("paper", PAPERS, name)
+    stem, content = toml_file.read("paper", PAPERS, name)
     beside = Path(name).parent if name.endswith(".toml") else None
     folder, reference = (beside or resources.files(package) for package in ("bench.published", "bench.reference"))
     return _parsed(stem, f"layout {name}", content, folder, reference)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import so3
-from bench.problem import Estimate, Floats, Instance, Ints
-from bench.scoring.alignment import RULES, align
-from bench.scoring.oracle import curve
+from bench.core import so3
+from bench.core.problem import Estimate, Floats, Instance, Ints
+from bench.scoring.metrics.alignment import RULES, align
+from bench.scoring.metrics.oracle import curve
 
 WORST_DEG = 180.0
 Centre = Callable[[Floats], np.floating]

@@ -5,7 +5,7 @@ import io
 import math
 from importlib.resources.abc import Traversable
 
-from bench.errors import InputError, shown
+from bench.core.errors import InputError, shown
 
 SCENE = "scene"
 FACTS = ("n_cameras", "edges_percent", "hardness")  # what a table prints of a scene, by the names that we score

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from bench.reporting import appearance, tables
-from bench.reporting.intervals import with_intervals
-from bench.results import Results
+from bench.reporting import appearance
+from bench.reporting.tables import render
+from bench.reporting.tables.intervals import with_intervals
+from bench.scoring.results import Results
 
 EXTENSIONS = {"console": "txt", "markdown": "md", "csv": "csv", "latex": "tex"}
 
@@ -12,11 +13,11 @@ EXTENSIONS = {"console": "txt", "markdown": "md", "csv": "csv", "latex": "tex"}
 def render_table(
     results: Results, style: str, *, width: int = 100, terminal: bool = False
 ) -> tuple[str, tuple[str, ...]]:
-    """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render`."""
+    """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render.render`."""
     frame = appearance.current().ordered(results.frame)
     if style == "csv":
         frame = with_intervals(frame, results.errors)
-    return tables.render(frame, results.ties, results.footnotes, style, width=width, terminal=terminal)
+    return render.render(frame, results.ties, results.footnotes, style, width=width, terminal=terminal)
 
 
 def write_tables(results: Results, folder: Path) -> list[Path]:
@@ -32,7 +33,7 @@ def write_tables(results: Results, folder: Path) -> list[Path]:
 
 def write_plots(results: Results, folder: Path) -> list[Path]:
     """Draw every figure that the run has data for, as PNG, PDF and SVG; those for a paper with a file of captions."""
-    from bench.reporting import captions, iterations, plots
+    from bench.reporting.figures import captions, iterations, plots
 
     folder.mkdir(parents=True, exist_ok=True)
     frame = appearance.current().ordered(results.frame)

@@ -1,0 +1,1 @@
+"""The vocabulary: rotations, problems, estimates, outcomes and errors; it imports nothing else of bench."""

@@ -1,0 +1,99 @@
+"""NumPy archives from anywhere, read without trust: no pickle, and nothing allocated that the file does not hold.
+
+An archive is a zip of arrays, and a few bytes of it can claim any size. Here the header of each array must agree
+with the size of its member, and all members together may not be far larger than the file itself.
+"""
+
+import math
+import zipfile
+from collections.abc import Collection
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from bench.core.errors import InputError
+
+_NUMBERS = "biufc"
+_COMPRESSION = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # what numpy writes
+_MOST_RATIO = 100  # zeros compress a thousandfold, measurements hardly at all
+_ALWAYS_FINE = 64 * 2**20  # bytes
+
+
+class _UnreadableError(Exception):
+    """Why an array cannot be read, to be completed by the name of the file."""
+
+
+def load(path: Path, wanted: Collection[str]) -> dict[str, NDArray[Any]]:
+    """Read arrays of numbers from a ``.npz``.
+
+    Parameters
+    ----------
+    path
+        The archive.
+    wanted
+        Names of arrays; those that are not in it are left out, and others in it are not looked at.
+
+    Raises
+    ------
+    InputError
+        Naming the file, and the array where one is at fault: no such file, not a NumPy archive, damaged, objects
+        that would need pickle, or more bytes than such a file can honestly hold.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _arrays(archive, wanted, max(_ALWAYS_FINE, _MOST_RATIO * path.stat().st_size))
+    except _UnreadableError as error:
+        raise InputError(f"{path}: {error}") from None
+    except Exception as error:  # a damaged zip or header may fail in any of a dozen ways
+        raise InputError(
+            f"{path}: cannot be read as a NumPy archive of plain arrays; write it with numpy.savez"
+        ) from error
+
+
+def _arrays(archive: zipfile.ZipFile, wanted: Collection[str], most: int) -> dict[str, NDArray[Any]]:
+    members: dict[str, zipfile.ZipInfo] = {}
+    for info in archive.infolist():
+        name = info.filename.removesuffix(".npy")
+        if name not in wanted:
+            continue
+        if name in members:
+            raise _UnreadableError(f"'{name}' is there twice; write the file with numpy.savez")
+        members[name] = info
+    total = sum(info.file_size for info in members.values())
+    if total > most:
+        raise _UnreadableError(f"its arrays claim {total} bytes, far more than such a file can hold; write it again")
+    return {name: _array(archive, name, info) for name, info in members.items()}
+
+
+def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo) -> NDArray[Any]:
+    if info.compress_type not in _COMPRESSION:
+        raise _UnreadableError(f"'{name}' is compressed in a way that numpy does not write; write it with numpy.savez")
+    with archive.open(info) as file:
+        shape, fortran, dtype = _header(file)
+        if dtype.kind not in _NUMBERS or dtype.subdtype is not None:
+            raise _UnreadableError(f"'{name}' holds {dtype.name}; a file of plain arrays holds numbers")
+        size = math.prod(shape) * dtype.itemsize
+        if min(shape, default=0) < 0 or size != info.file_size - file.tell():
+            raise _UnreadableError(
+                f"'{name}' claims the shape {_brief(shape)}, but holds something else; write it again"
+            )
+        data = file.read(size)
+        file.read(1)  # to the end, where the checksum is compared
+    flat = np.frombuffer(data, dtype=dtype, count=math.prod(shape)).astype(dtype.newbyteorder("="))
+    return flat.reshape(shape, order="F" if fortran else "C")
+
+
+def _header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    version = npy.read_magic(file)
+    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    header: tuple[tuple[int, ...], bool, np.dtype[Any]] = read(file)
+    return header
+
+
+def _brief(shape: tuple[int, ...]) -> str:
+    return str(shape) if len(shape) <= 4 and max(map(abs, shape), default=0) < 10**18 else f"of {len(shape)} lengths"

@@ -1,0 +1,1 @@
+"""How methods and datasets are declared, found, configured, selected and hashed."""

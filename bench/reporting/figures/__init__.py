@@ -1,0 +1,1 @@
+"""Figures of scored rows, as files."""

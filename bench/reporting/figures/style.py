@@ -1,0 +1,174 @@
+"""How figures look: one colour, marker and line for each method, and how a figure is saved."""
+
+import math
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+from bench.reporting import appearance
+from bench.reporting.tables.rows import Configured
+
+# Okabe and Ito's palette, told apart with any colour vision; its yellow is too light for lines on white.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+LINES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
+GREY = "#666666"
+FORMATS = ("png", "pdf", "svg")
+SETTINGS: dict[Any, Any] = {
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "pdf.fonttype": 42,
+    "ps.fonttype": 42,
+    "text.parse_math": False,  # a title may hold a dollar sign
+    "svg.hashsalt": "rotsync-bench",
+    "savefig.dpi": 200,
+}
+LEGEND_LINE = 0.17  # inches
+LABEL = 24  # characters of a line
+MOST_COLUMNS = 3
+NARROWEST_PANEL = 2.0  # inches
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a configured method is called and drawn, the same in every figure of a run."""
+
+    label: str
+    color: str
+    line: Any
+    marker: str
+
+
+def looks(frame: pd.DataFrame) -> dict[Configured, Look]:
+    """A look for each configured method, in the order in which the frame first names them; 28 differ."""
+    wanted = appearance.current()
+    colors = wanted.colors or COLORS
+    found = frame.drop_duplicates(["method", "params"])
+    keys = list(zip(found["method"], found["params"], strict=True))
+    shown = [wanted.head(*key, str(title)) for key, title in zip(keys, found["title"], strict=True)]
+    heads = [f"{title} ({params})" if params else title for title, params in shown]
+    out = {}
+    for k, ((method, params), head) in enumerate(zip(keys, heads, strict=True)):
+        own = wanted.of(method, params)
+        turn = k // len(colors)
+        label = head if heads.count(head) == 1 else f"{head} [{method}]"
+        out[method, params] = Look(
+            label="\n".join(textwrap.wrap(label.replace(",", ", "), LABEL)) if wanted.width_in else label,
+            color=own.color or colors[k % len(colors)],
+            line=own.line or LINES[turn % len(LINES)],
+            marker=own.marker or MARKERS[(k + turn) % len(MARKERS)],
+        )
+    return out
+
+
+def lines_of(look: Mapping[Configured, Look]) -> int:
+    """Lines of the tallest label: in a figure for a paper long ones are wrapped."""
+    return max((style.label.count("\n") + 1 for style in look.values()), default=1)
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Our settings on top of matplotlib's defaults, whatever the user's matplotlibrc says."""
+    wanted = appearance.current()
+    size = {"font.size": wanted.font_size, "axes.titlesize": wanted.font_size, "legend.fontsize": "small"}
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(SETTINGS | size | ({"font.family": wanted.font} if wanted.font else {}))
+        yield
+
+
+def columns_of(count: int) -> int:
+    """Panels beside each other, of `count`."""
+    width = appearance.current().width_in
+    return min(MOST_COLUMNS, count, max(1, int(width / NARROWEST_PANEL)) if width else count)
+
+
+def panels(count: int, width: float, height: float, legend: Sequence[Line2D]) -> tuple[Figure, list[Axes]]:
+    """Figure with `count` panels that share both axes.
+
+    The panels are `width` by `height` inches with the legend at their right; where a style file gives the width of the
+    figure, as wide as that leaves them, with the legend below.
+    """
+    fixed = appearance.current().width_in
+    if count == 1 and not fixed:
+        width, height = 1.7 * width, 1.5 * height if legend else height
+    columns = columns_of(count)
+    rows = math.ceil(count / columns)
+    tall = rows * height + 0.7
+    labels = [str(handle.get_label()) for handle in legend]
+    longest = 0.055 * max((len(line) for label in labels for line in label.split("\n")), default=0) + 0.5
+    lines = max((label.count("\n") + 1 for label in labels), default=1)
+    if fixed:
+        legend_columns = max(1, int(fixed / longest))
+        wide, tall = fixed, tall - 0.5 + lines * LEGEND_LINE * math.ceil(len(legend) / legend_columns)
+    else:
+        legend_columns = math.ceil(len(legend) / max(1, int((tall - 0.5) / LEGEND_LINE)))
+        wide = columns * width + 0.5 + legend_columns * longest * bool(legend)
+    figure = Figure(figsize=(wide, tall), layout="constrained")
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    axes = list(grid.flat)
+    for unused in axes[count:]:
+        unused.set_axis_off()
+    for ax in axes[max(0, count - columns) : count]:
+        ax.xaxis.set_tick_params(labelbottom=True)
+    if legend:
+        below = "outside lower center" if fixed else "outside right upper"
+        figure.legend(handles=list(legend), loc=below, ncols=legend_columns)  # type: ignore[call-overload]
+    return figure, axes[:count]
+
+
+def describe(figure: Figure, title: str, caption: str) -> None:
+    """Title above, caption below; in a figure for a paper, which has its own, they are kept but not drawn."""
+    drawn = appearance.current().width_in is None
+    lines = textwrap.wrap(caption, int(figure.get_figwidth() * 18))
+    for artist in (
+        figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize="large"),
+        figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize="small", color=GREY),
+    ):
+        artist.set_visible(drawn)
+        artist.set_in_layout(drawn)
+
+
+def described(figure: Figure) -> tuple[str, str]:
+    """Title and caption of a figure."""
+    return figure.get_suptitle(), " ".join(figure.get_supxlabel().split())
+
+
+def log_axis(axis: Any, low: float, high: float, ticks: Sequence[float]) -> None:
+    """Plain numbers at round values of a logarithmic axis."""
+    axis.set_major_locator(FixedLocator([t for t in ticks if low <= t <= high]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
+
+
+def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Write a figure in each format, fonts embedded, without a date; a missing folder is made."""
+    folder.mkdir(parents=True, exist_ok=True)
+    title, caption = described(figure)
+    metadata: dict[str, dict[str, str | None]] = {
+        "pdf": {"CreationDate": None, "Title": title, "Subject": caption},
+        "svg": {"Date": None},
+    }
+    paths = [folder / f"{name}.{suffix}" for suffix in formats]
+    with styled():
+        for path, suffix in zip(paths, formats, strict=True):
+            figure.savefig(path, format=suffix, metadata=metadata.get(suffix, {}))
+    return paths

@@ -1,0 +1,117 @@
+"""The rows of the leaderboard: every method on every scene and over all scenes, under every alignment rule."""
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from bench.reporting.html.embed import rounded
+from bench.reporting.html.standing import ranks, standings
+from bench.reporting.tables.rows import Entry, Scene, Value
+
+ALL_SCENES = "All scenes"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its key, its head, how its values are written, and what it means."""
+
+    key: str
+    head: str
+    kind: str  # text, deg, seconds, percent, number, area
+    meaning: str
+
+
+COLUMNS = (
+    Column("method", "Method", "text", "The selection that runs it"),
+    Column("scene", "Scene", "text", "Instance, or all scenes with ground truth together"),
+    Column("protocol", "Protocol", "text", "Which cameras are solved and scored"),
+    Column("alignment", "Alignment", "text", "The rule that removed the gauge"),
+    Column("rank", "Rank", "number", "Rank of the median error; over all scenes the mean rank, failures last"),
+    Column("median", "Median °", "deg", "Median error over the scored cameras; over all scenes the geometric mean"),
+    Column("mean", "Mean °", "deg", "Mean error over the scored cameras; over all scenes the geometric mean"),
+    Column("p90", "90 % °", "deg", "90th percentile of the error over the scored cameras"),
+    Column("within", "< 5°", "percent", "Share of the scored cameras with an error below 5 degrees"),
+    Column("residual", "Residual °", "deg", "Median residual of the edges; needs no ground truth and no alignment"),
+    Column("auc", "AUC", "area", "Area under the ROC curve of the edge weights against the true outliers"),
+    Column("time", "Time s", "seconds", "Time to solve; over all scenes the geometric mean"),
+    Column("speedup", "Times faster", "number", "Than the baseline of the timing run"),
+    Column("memory", "MiB", "number", "What solving added to the resident memory, at its peak"),
+    Column("cameras", "Cameras", "text", "Solved / scored / all"),
+    Column("best_on", "Best on", "text", "Scenes on which it is among the best"),
+    Column("outcome", "Outcome", "text", "How the jobs ended"),
+)
+
+
+def leaderboard(by_rule: Mapping[str, Sequence[Scene]]) -> dict[str, Any]:
+    """Columns and rows as the page reads them; a column that no row has a value in is left out.
+
+    Texts are written once: a column of kind text has its ``values``, and the rows hold their numbers in it.
+    """
+    rows = [row for scenes in by_rule.values() for row in _rows(scenes)]
+    columns = [c for c in COLUMNS if any(row.get(c.key) is not None for row in rows)]
+    texts = {c.key: list(dict.fromkeys(row.get(c.key) for row in rows)) for c in columns if c.kind == "text"}
+    number = {key: {value: k for k, value in enumerate(values)} for key, values in texts.items()}
+    return {
+        "columns": [dataclasses.asdict(c) | {"values": texts.get(c.key)} for c in columns],
+        "rows": [
+            [number[c.key][row.get(c.key)] if c.key in number else row.get(c.key) for c in columns] for row in rows
+        ],
+        "best": [k for k, row in enumerate(rows) if row["best"]],
+        "all": ALL_SCENES,
+    }
+
+
+def _rows(scenes: Sequence[Scene]) -> Iterator[dict[str, Any]]:
+    for protocol in dict.fromkeys(scene.protocol for scene in scenes):
+        own = [scene for scene in scenes if scene.protocol == protocol]
+        if len(own) > 1:
+            yield from _overall(own)
+    several = len({scene.dataset for scene in scenes}) > 1
+    for scene in scenes:
+        name = f"{scene.dataset} / {scene.instance}" if several else scene.instance
+        for entry, rank in zip(scene.entries, ranks(scene), strict=True):
+            yield _row(scene, name, entry, rank)
+
+
+def _overall(scenes: Sequence[Scene]) -> Iterator[dict[str, Any]]:
+    for standing in standings(scenes):
+        yield {
+            "method": standing.label,
+            "scene": ALL_SCENES,
+            "protocol": scenes[0].protocol,
+            "alignment": scenes[0].alignment,
+            "outcome": "ok" if standing.complete else f"ok on {standing.ended} of {standing.scenes}",
+            "best_on": f"{len(standing.best_on)} of {standing.scenes}",
+            "rank": rounded(standing.rank),
+            "median": rounded(standing.median_deg),
+            "mean": rounded(standing.mean_deg),
+            "time": rounded(standing.seconds),
+            "best": len(standing.best_on) == standing.scenes,
+        }
+
+
+def _row(scene: Scene, name: str, entry: Entry, rank: float) -> dict[str, Any]:
+    def value(key: str) -> float | int | None:
+        return rounded(entry.values.get(key, Value(math.nan)).mean)
+
+    return {
+        "method": entry.label,
+        "scene": name,
+        "protocol": scene.protocol,
+        "alignment": scene.alignment,
+        "outcome": entry.failure or "ok",
+        "rank": rank if entry.ok and entry.scored else None,
+        "median": value("median_deg"),
+        "mean": value("mean_deg"),
+        "p90": value("p90_deg"),
+        "within": value("within_5_deg"),
+        "residual": value("residual_median_deg"),
+        "auc": value("roc_auc"),
+        "time": value("solve_s"),
+        "speedup": value("speedup"),
+        "memory": value("peak_mib"),
+        "cameras": f"{entry.solved}/{entry.scored}/{scene.cameras}" if entry.ok else None,
+        "best": entry.best,
+    }

@@ -1,0 +1,239 @@
+"""The whole page: gathers the sections, embeds data, style, script and plotly, and writes one file."""
+
+import base64
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from bench.reporting.html import overview, ranks, reversals, words
+from bench.reporting.html.embed import compact
+from bench.reporting.html.failures import Failure, failures, notes
+from bench.reporting.html.leaderboard import leaderboard
+from bench.reporting.html.origin import Facts, origin
+from bench.reporting.html.scene import sections as forensics
+from bench.reporting.html.section import SceneSections, Section, Table, Value, anchor
+from bench.reporting.html.standing import standings
+from bench.reporting.tables.rows import Scene, is_timed
+from bench.reporting.tables.rows import scenes as scenes_of
+from bench.scoring.results import Results
+from bench.storage.store import Store
+
+FILE_NAME = "report.html"
+SCENE_PARTS: tuple[SceneSections, ...] = (overview.scene_sections, forensics)
+
+
+@dataclass(frozen=True)
+class ScenePage:
+    """The folded part of the page that is about one scene."""
+
+    id: str
+    title: str
+    facts: str
+    sections: tuple[Section, ...]
+
+
+def write_report(store: Store, by_rule: Mapping[str, Results], path: Path) -> Path:
+    """Write the report of a run to a file.
+
+    Parameters
+    ----------
+    store
+        The run.
+    by_rule
+        The run scored under one or more alignment rules, see `bench.reporting.html.realign`; the report is about
+        the first, the others are in the leaderboard and tell whether the choice matters.
+    path
+        The file, replaced where it exists.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.part")
+    temporary.write_text(render(store, by_rule), encoding="utf-8")
+    temporary.replace(path)
+    return path
+
+
+def render(store: Store, by_rule: Mapping[str, Results]) -> str:
+    """Text of the page."""
+    results = next(iter(by_rule.values()))
+    by_scene = {rule: scenes_of(r.frame, r.ties) for rule, r in by_rule.items()}
+    scenes = by_scene[results.alignment]
+    headline = _headline(scenes)
+    standing = standings(headline)
+    suites = list(dict.fromkeys(plan.suite for plan in store.plans()))
+    sections = [*overview.overall(results, headline, standing), *ranks.sections(results.frame)]
+    pages = _scene_pages(store, results, scenes)
+    data = {"leaderboard": leaderboard(by_scene)} | {
+        f"figure-{s.id}": compact(s.figure) for s in [*sections, *(s for p in pages for s in p.sections)] if s.figure
+    }
+    return _html(
+        title=f"{', '.join(suites)}: rotation synchronization",
+        summary=words.summary(headline, standing, is_timed(results.frame)),
+        flags=_flags(by_rule, by_scene, scenes),
+        dependence=overview.dependence(by_scene) if len(by_scene) > 1 else None,
+        sections=sections,
+        scenes=pages,
+        failures=failures(store, results.frame),
+        notes=notes(scenes),
+        footnotes=results.footnotes,
+        origin=origin(store, results.frame["job"]),
+        data=data,
+    )
+
+
+def _headline(scenes: Sequence[Scene]) -> list[Scene]:
+    """What the findings are about: one protocol, where a scene was run under several."""
+    several = len({(s.dataset, s.instance) for s in scenes}) < len(scenes)
+    return [s for s in scenes if not several or s.protocol == scenes[0].protocol]
+
+
+def _flags(
+    by_rule: Mapping[str, Results], by_scene: Mapping[str, Sequence[Scene]], scenes: Sequence[Scene]
+) -> list[tuple[bool, str]]:
+    """Sentence on each choice that was varied, and whether it matters."""
+    found: list[tuple[bool, str]] = []
+    better = {rule: reversals.better_pairs(results) for rule, results in by_rule.items()}
+    if len(by_scene) > 1 and any(e.scored for s in scenes for e in s.entries):
+        found += words.depends("alignment", by_scene, reversals.by_alignment(by_scene, better))
+    protocols = list(dict.fromkeys(scene.protocol for scene in scenes))
+    if len({(s.dataset, s.instance) for s in scenes}) < len(scenes):
+        shared = _under_every(scenes, protocols)
+        found += words.depends("protocol", shared, reversals.by_protocol(scenes, next(iter(better.values()))))
+    return found
+
+
+def _under_every(scenes: Sequence[Scene], protocols: Sequence[str]) -> dict[str, list[Scene]]:
+    """By protocol, the scenes that were run under each of them."""
+    names = Counter((s.dataset, s.instance) for s in scenes)
+    both = [s for s in scenes if names[s.dataset, s.instance] == len(protocols)]
+    return {protocol: [s for s in both if s.protocol == protocol] for protocol in protocols}
+
+
+def _scene_pages(store: Store, results: Results, scenes: Sequence[Scene]) -> list[ScenePage]:
+    several = len({scene.dataset for scene in scenes}) > 1
+    protocols = len({scene.protocol for scene in scenes}) > 1
+    pages = []
+    used: set[str] = set()
+    for scene in scenes:
+        place = (scene.dataset, scene.instance, scene.protocol)
+        sections = [s for part in SCENE_PARTS for s in part(store, results, place)]
+        title = f"{f'{scene.dataset} / ' if several else ''}{words.spoken(scene)}"
+        pages.append(
+            ScenePage(
+                _unique(anchor("scene", *place), used),
+                f"{title} ({scene.protocol})" if protocols else title,
+                _facts(scene),
+                tuple(replace(s, id=_unique(s.id, used)) for s in sections),
+            )
+        )
+    return pages
+
+
+def _facts(scene: Scene) -> str:
+    """One line: cameras, who is best, what failed."""
+    best = [e for e in scene.entries if e.best]
+    failed = sum(sum(e.failures.values()) for e in scene.entries)
+    parts = [words.count(scene.cameras, "camera")]
+    if best:
+        parts.append(f"best: {words.enumeration([e.label for e in best])}")
+    if failed:
+        parts.append(f"{failed} failed")
+    return " · ".join(parts)
+
+
+def _unique(name: str, used: set[str]) -> str:
+    """The name, or the name with a number; two scenes may differ in signs that an id cannot hold."""
+    found, k = name, 1
+    while found in used:
+        k += 1
+        found = f"{name}-{k}"
+    used.add(found)
+    return found
+
+
+def _html(
+    *,
+    title: str,
+    summary: Sequence[str],
+    flags: Sequence[tuple[bool, str]],
+    dependence: Table | None,
+    sections: Sequence[Section],
+    scenes: Sequence[ScenePage],
+    failures: Sequence[Failure],
+    notes: Sequence[tuple[str, str, str]],
+    footnotes: Sequence[str],
+    origin: Facts,
+    data: Mapping[str, Any],
+) -> str:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from jinja2.utils import htmlsafe_json_dumps
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=PackageLoader("bench.reporting.html"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["cell"] = cell
+    scripts = [_asset("theme.js"), _plotly(), _asset("page.js")]
+    embedded = {key: htmlsafe_json_dumps(value, dumps=_dumps) for key, value in data.items()}
+    return environment.get_template("page.html").render(
+        title=title,
+        summary=summary,
+        flags=flags,
+        dependence=dependence,
+        sections=sections,
+        scenes=scenes,
+        failures=failures,
+        notes=notes,
+        footnotes=footnotes,
+        origin=origin,
+        data=embedded,
+        policy=_policy(scripts),
+        style=Markup(_asset("style.css")),
+        scripts=[Markup(script) for script in scripts],
+    )
+
+
+def cell(value: Value) -> str:
+    """A value as a small table prints it."""
+    if isinstance(value, float):
+        return f"{value:.3g}" if value == value else "–"
+    return "–" if value is None else str(value)
+
+
+def _dumps(value: Any, **_: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def _policy(scripts: Iterable[str]) -> str:
+    """Content security policy: only our own scripts run, and nothing is loaded from anywhere.
+
+    Scripts are allowed by their hash, so that even markup that got past the escaping could not run. Plotly compiles its
+    WebGL shaders with ``eval``.
+    """
+    hashes = " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'" for script in scripts
+    )
+    return (
+        f"default-src 'none'; script-src 'unsafe-eval' {hashes}; style-src 'unsafe-inline'; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+
+
+@cache
+def _plotly() -> str:
+    from plotly.offline import get_plotlyjs
+
+    return str(get_plotlyjs())
+
+
+def _asset(name: str) -> str:
+    return files("bench.reporting.html").joinpath("templates", name).read_text(encoding="utf-8")

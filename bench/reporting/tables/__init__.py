@@ -1,0 +1,1 @@
+"""Tables of scored rows, in the console, Markdown, CSV and LaTeX."""

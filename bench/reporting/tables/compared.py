@@ -1,0 +1,97 @@
+"""The comparison of two runs as text."""
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from bench.reporting.tables.grid import ABSENT, Cell, Grid
+from bench.reporting.tables.rows import degrees, exact_seconds
+from bench.scoring.comparison import IDENTICAL, TIME, Comparison
+
+WORDS = {"all": "all methods", "method": "over all scenes"}
+HEADS = ("first", "second", "ratio", "95 % interval", "p", "verdict")
+
+
+def comparison_grid(found: Comparison, alignment: str, threshold: float) -> Grid:
+    """All methods, each method, and the scenes on which something can be told; worse is bold.
+
+    Parameters
+    ----------
+    found
+        The comparison.
+    alignment, threshold
+        What its errors and verdicts go by.
+    """
+    rows = found.rows
+    told = rows["verdict"].isin(["better", "worse"])
+    shown = rows[told | ((rows["level"] != "scene") & (rows["verdict"] != IDENTICAL))]
+    several = rows.loc[rows["level"] == "scene", "instance"].nunique() > 1
+    return Grid(
+        caption=f"{found.cells} jobs compared; errors in degrees, {alignment} alignment",
+        facts=("Method", "on", "of"),
+        methods=tuple((head, "") for head in HEADS),
+        rows=tuple(_row(row) for row in shown.itertuples() if several or row.level != "all"),
+        notes=(*_legend(found, threshold), *(f"{_capital(note)}." for note in found.notes)),
+    )
+
+
+def verdict(found: Comparison) -> str:
+    """The last line: what has become of it all."""
+    if found.identical:
+        return "identical"
+    worse = [str(outcome) for outcome in found.outcomes if outcome.worse]
+    rows = found.rows[found.rows["verdict"] == "worse"]
+    if not worse and rows.empty:
+        return "nothing is worse"
+    methods = dict.fromkeys(_label(row) for row in rows.itertuples() if row.level != "all")
+    return "; ".join(["worse: " + (", ".join(methods) or "all methods together")] * (not rows.empty) + worse)
+
+
+def _row(row: "object") -> tuple[tuple[str, ...], tuple[Cell, ...]]:
+    level, instance, quantity, word = (str(getattr(row, name)) for name in ("level", "instance", "quantity", "verdict"))
+    old, new, ratio, low, high, p = (float(getattr(row, n)) for n in ("old", "new", "ratio", "low", "high", "p_holm"))
+    value = exact_seconds if quantity == TIME else degrees
+    known = low == low
+    cells = (
+        value(old),
+        value(new),
+        f"{ratio:.3f}",
+        f"{low:.3f} to {high:.3f}" if known else ABSENT,
+        ABSENT if p != p else "< 0.001" if p < 0.001 else f"{p:.3f}",
+    )
+    facts = (_label(row), instance if level == "scene" else WORDS[level], quantity)
+    return facts, (*map(Cell, cells), Cell(word, word == "worse"))
+
+
+def _label(row: "object") -> str:
+    method, params = str(row.method), str(row.params)  # type: ignore[attr-defined]
+    return f"{method}[{params}]" if params else method
+
+
+def _legend(found: Comparison, threshold: float) -> Iterator[str]:
+    yield (
+        "Ratio: second run to first, geometric mean over problems, above 1 is worse; p after Holm's correction. Better "
+        f"or worse: p < 0.05 and a ratio beyond {threshold:g}. Single scenes are listed where they can be told."
+    )
+    same = found.rows[(found.rows["level"] == "method") & (found.rows["verdict"] == IDENTICAL)]
+    if len(same):
+        yield f"Identical: {', '.join(dict.fromkeys(_label(row) for row in same.itertuples()))}."
+    yield from (f"{outcome}." for outcome in found.outcomes)
+
+
+def _capital(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}"
+
+
+def comparison_table(found: Comparison) -> pd.DataFrame:
+    """Every row unrounded, with a row for each changed outcome."""
+    rows = [
+        {
+            "level": "outcome",
+            **dict(zip(("dataset", "instance", "protocol", "method", "params"), outcome.cell, strict=False)),
+            "quantity": f"seed {outcome.cell[-1]}",
+            "verdict": f"{outcome.old} -> {outcome.new}",
+        }
+        for outcome in found.outcomes
+    ]
+    return pd.concat([found.rows, pd.DataFrame(rows)], ignore_index=True) if rows else found.rows

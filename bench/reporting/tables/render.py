@@ -1,0 +1,81 @@
+"""Tables of a scored run: for the terminal, for Markdown, for a paper, and the long one for a spreadsheet."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from bench.core.errors import InputError
+from bench.plugins.registry import suggestion
+from bench.reporting.tables.rows import Ties
+
+FORMATS = ("console", "markdown", "csv", "latex")
+COLUMNS = (
+    "dataset",
+    "instance",
+    "method",
+    "params",
+    "seed",
+    "protocol",
+    "alignment",
+    "status",
+    "mean_deg",
+    "median_deg",
+    "solve_s",
+    "peak_mib",
+    "n_cameras",
+    "n_solved",
+    "n_scored",
+)
+
+
+def render(
+    frame: pd.DataFrame,
+    ties: Ties,
+    footnotes: Sequence[str],
+    style: str = "console",
+    *,
+    width: int = 100,
+    terminal: bool = False,
+) -> tuple[str, tuple[str, ...]]:
+    """Draw a scored run as a table.
+
+    Parameters
+    ----------
+    frame
+        Scored rows, one for each (scene, method, params, seed), with at least `COLUMNS` and ``title``. Used
+        where present: ``p90_deg, within_5_deg, residual_mean_deg, residual_median_deg, edges_percent,
+        hardness, roc_auc, notes`` and ``timing`` (True on rows of a timing run, which
+        then have ``rounds, baseline, min_s, speedup, speedup_low, speedup_high`` too).
+    ties
+        For each (dataset, instance, protocol) the (method, params) that cannot be told apart from the best.
+    footnotes
+        What a reader must know.
+    style
+        One of `FORMATS`. ``csv`` is the long table, unrounded, `COLUMNS` first; the others draw seeds
+        together.
+    width, terminal
+        Columns of the console, and whether it understands escape codes.
+
+    Returns
+    -------
+    tuple
+        The text, and the footnotes that are not in it (all of them for ``csv``, none otherwise).
+
+    Raises
+    ------
+    InputError
+        On an unknown format.
+    """
+    if style == "csv":
+        ordered = [*COLUMNS, *(name for name in frame.columns if name not in COLUMNS)]
+        return frame[ordered].to_csv(index=False), tuple(footnotes)
+    if style == "console":
+        from bench.reporting.tables.console import render_console
+
+        return render_console(frame, ties, footnotes, width=width, terminal=terminal), ()
+    if style in ("markdown", "latex"):
+        from bench.reporting.tables.grid import grids, markdown
+        from bench.reporting.tables.latex import latex
+
+        return (markdown if style == "markdown" else latex)(grids(frame, ties), footnotes), ()
+    raise InputError(f"there is no table format '{style}'{suggestion(style, FORMATS)}")

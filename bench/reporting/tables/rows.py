@@ -1,0 +1,256 @@
+"""What a table says of each scene: one entry for each configured method, its seeds drawn together."""
+
+import math
+from collections.abc import Hashable, Iterator, Mapping, Set
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from bench.scoring.inference.statistics import seed_half_width
+
+Place = tuple[str, str, str]  # dataset, instance, protocol
+Configured = tuple[str, str]  # method, params
+Ties = Mapping[Place, Set[Configured]]
+
+OK = "ok"
+BUSY = 0.05  # of the time of a solution spent waiting for the core, from which on a table says so
+TIE_LEGEND = (
+    "not told apart from the best median, nor by the mean (paired bootstrap over cameras and seeds, level 5 %, "
+    "all pairs corrected; cameras of a scene are correlated)"
+)
+
+
+@dataclass(frozen=True)
+class Value:
+    """Mean over the seeds that ended well, and the half-width of its 95 % t interval (NaN for one seed)."""
+
+    mean: float
+    half_width: float = math.nan
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a number."""
+        return math.isfinite(self.mean)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A configured method on a scene.
+
+    Parameters
+    ----------
+    method, title, params
+        Its id, its name in words and the parameters given, as text.
+    values
+        By column of the frame.
+    solved, scored
+        Cameras, rounded mean over the seeds that ended well.
+    seeds, ok
+        How many were planned and how many ended well.
+    failures
+        How often each status other than ok occurred.
+    notes
+        What the method or the harness noted, such as fallbacks.
+    best
+        Whether it cannot be told apart from the best.
+    """
+
+    method: str
+    title: str
+    params: str
+    values: Mapping[str, Value]
+    solved: int
+    scored: int
+    seeds: int
+    ok: int
+    failures: Mapping[str, int]
+    notes: tuple[str, ...]
+    best: bool
+
+    @property
+    def label(self) -> str:
+        """The selection that runs it: ``shonan[loss=huber]``."""
+        return f"{self.method}[{self.params}]" if self.params else self.method
+
+    @property
+    def roc_auc(self) -> Value:
+        """Area under the ROC curve of the edge weights."""
+        return self.values.get("roc_auc", Value(math.nan))
+
+    @property
+    def failure(self) -> str:
+        """Every status other than ok, with how many seeds it took where there are several."""
+        if self.seeds == 1:
+            return "; ".join(self.failures)
+        return "; ".join(f"{status} ({count} of {self.seeds} seeds)" for status, count in self.failures.items())
+
+
+@dataclass(frozen=True)
+class Scene:
+    """An instance under a protocol and an alignment rule, with its entries in the order of the frame."""
+
+    dataset: str
+    instance: str
+    protocol: str
+    alignment: str
+    cameras: int
+    edges_percent: float
+    hardness: float
+    entries: tuple[Entry, ...]
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether any entry was scored; True where nothing ended well, because that is not known then."""
+        return any(e.scored for e in self.entries) or not any(e.ok for e in self.entries)
+
+    @property
+    def has_roc(self) -> bool:
+        """Whether the edge weights of any entry could be held against the true outliers."""
+        return any(e.roc_auc.known for e in self.entries)
+
+
+_VALUES = (
+    "mean_deg",
+    "median_deg",
+    "p90_deg",
+    "within_5_deg",
+    "solve_s",
+    "peak_mib",
+    "residual_mean_deg",
+    "residual_median_deg",
+    "min_s",
+    "speedup",
+    "speedup_low",
+    "speedup_high",
+    "roc_auc",
+)
+ROC_LEGEND = "area under the ROC curve of a method's edge weights against the true outliers; 1 tells all of them apart"
+
+
+def scenes(frame: pd.DataFrame, ties: Ties) -> list[Scene]:
+    """Group scored rows, keeping their order."""
+    out = []
+    for (dataset, instance, protocol, alignment), rows in _groups(
+        frame, ["dataset", "instance", "protocol", "alignment"]
+    ):
+        tied = ties.get((dataset, instance, protocol), frozenset())
+        entries = tuple(_entry(group, tied) for _, group in _groups(rows, ["method", "title", "params"]))
+        out.append(
+            Scene(
+                dataset,
+                instance,
+                protocol,
+                alignment,
+                cameras=_whole(rows["n_cameras"]),
+                edges_percent=_first(rows, "edges_percent"),
+                hardness=_first(rows, "hardness"),
+                entries=entries,
+            )
+        )
+    return out
+
+
+def _entry(rows: pd.DataFrame, tied: Set[Configured]) -> Entry:
+    method, title, params = (str(rows[name].iloc[0]) for name in ("method", "title", "params"))
+    ok = rows[rows["status"] == OK]
+    failed = rows.loc[rows["status"] != OK, "status"]
+    notes = rows["notes"].fillna("") if "notes" in rows else pd.Series(dtype=str)
+    return Entry(
+        method,
+        title,
+        params,
+        values={name: _value(ok[name]) for name in _VALUES if name in rows},
+        solved=_whole(ok["n_solved"]),
+        scored=_whole(ok["n_scored"]),
+        seeds=len(rows),
+        ok=len(ok),
+        failures={str(status): int(count) for status, count in failed.value_counts(sort=False).items()},
+        notes=tuple(dict.fromkeys(note for note in map(str, notes) if note)),
+        best=(method, params) in tied,
+    )
+
+
+def _groups(frame: pd.DataFrame, columns: list[str]) -> Iterator[tuple[tuple[Any, ...], pd.DataFrame]]:
+    groups: Any = frame.groupby(columns, sort=False, dropna=False)
+    key: Hashable
+    for key, rows in groups:
+        yield tuple(key), rows  # type: ignore[arg-type]
+
+
+def _value(column: pd.Series) -> Value:
+    numbers = _numbers(column)
+    return Value(_mean(numbers), seed_half_width(numbers))
+
+
+def _whole(column: pd.Series) -> int:
+    numbers = _numbers(column)
+    return round(_mean(numbers)) if numbers else 0
+
+
+def _first(rows: pd.DataFrame, column: str) -> float:
+    numbers = _numbers(rows[column]) if column in rows else []
+    return numbers[0] if numbers else math.nan
+
+
+def _numbers(column: pd.Series) -> list[float]:
+    return pd.to_numeric(column, errors="coerce").dropna().astype(float).tolist()
+
+
+def _mean(numbers: list[float]) -> float:
+    return math.fsum(numbers) / len(numbers) if numbers else math.nan
+
+
+def is_timed(frame: pd.DataFrame) -> bool:
+    """Whether the rows are those of a timing run: the optional column ``timing`` is True on them."""
+    return "timing" in frame and bool(frame["timing"].all())
+
+
+def times_note(frame: pd.DataFrame) -> str:
+    """How the times were taken."""
+    if not is_timed(frame):
+        return "times from a packed accuracy run"
+    note = "times from a timing run, one job at a time on one core"
+    if "speedup" not in frame:
+        return note
+    rounds, baseline = (" and ".join(dict.fromkeys(map(str, frame[name]))) for name in ("rounds", "baseline"))
+    waited = pd.to_numeric(frame["waited"], errors="coerce").max()
+    busy = f"; the machine was busy: up to {100 * waited:.0f} % of a time went by waiting for the core"
+    return (
+        f"{note}: median and least of {rounds} rounds in which the methods took turns, and how many times faster "
+        f"than {baseline} (ratio of the medians, least to greatest ratio of a round){busy if waited > BUSY else ''}"
+    )
+
+
+def speedup(entry: Entry) -> str:
+    """Ratio to the baseline as a table prints it, with its range."""
+    ratio, low, high = (entry.values.get(f"speedup{end}", Value(math.nan)).mean for end in ("", "_low", "_high"))
+    return f"{ratio:.3g} ({low:.3g} to {high:.3g})" if math.isfinite(ratio) else "–"
+
+
+def degrees(value: float) -> str:
+    """An angle as a table prints it."""
+    if not math.isfinite(value):
+        return "–"
+    return "0" if value == 0 else f"{value:.2f}" if value >= 0.005 else f"{value:.0e}"
+
+
+def exact_seconds(value: float) -> str:
+    """A time of a timing run as a table prints it, three digits however short it is."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.{max(2 - math.floor(math.log10(value)), 0)}f}" if value > 0 else "0"
+
+
+def area(value: float) -> str:
+    """An area under a curve as a table prints it; what is below 1 never shows as 1."""
+    if not math.isfinite(value):
+        return "–"
+    return "1" if value == 1 else f"{min(value, 0.9999):.4f}"
+
+
+def seconds(value: float) -> str:
+    """A time as a table prints it, three digits."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.{3 if value < 1 else 2 if value < 10 else 1 if value < 100 else 0}f}"

@@ -1,0 +1,236 @@
+"""What every method must satisfy; ``bench check method NAME`` and the test suite run the same checks.
+
+Each check solves small problems whose answer is known, in the supervised child that a run would use.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bench.core import outcome, so3
+from bench.core.errors import InputError
+from bench.core.problem import Floats, Problem, oriented
+from bench.execution.single import Answer, SingleSolver
+from bench.execution.supervise import Limits
+from bench.plugins.references import cite_keys, references
+from bench.plugins.registry import Info
+
+LIMITS = Limits(seconds=60, memory_gib=4)
+CAMERAS = 12
+NOISE_DEG = 2.0
+
+
+class Failed(Exception):  # noqa: N818 - the finding of a check
+    """A check did not hold; the message says how."""
+
+
+class NotApplicable(Exception):  # noqa: N818 - the finding of a check
+    """A check could not be made; the message says why."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Result of one check: "passed", "failed" or "skipped", with the reason."""
+
+    check: str
+    result: str
+    detail: str = ""
+
+
+def check_method(info: Info, parameters: dict[str, Any]) -> Iterator[Finding]:
+    """Run every check on a configured method, yielding each finding as it is made."""
+    with SingleSolver(info, parameters, LIMITS) as solver:
+        kit = _Kit(info, solver)
+        for check in CHECKS:
+            name = check.__name__.strip("_").replace("_", " ")
+            try:
+                check(kit)
+            except Failed as finding:
+                yield Finding(name, "failed", str(finding))
+            except NotApplicable as finding:
+                yield Finding(name, "skipped", str(finding))
+            else:
+                yield Finding(name, "passed")
+
+
+@dataclass(frozen=True)
+class _Kit:
+    """The method under test, and how closely it promises to keep what is checked."""
+
+    info: Info
+    solver: SingleSolver
+
+    def promised(self, fact: str) -> Any:
+        """Promise of the method as configured: its attribute of that name, or what its declaration says."""
+        return self.info.fact(fact, self.info.configure(self.solver.parameters))
+
+    @property
+    def exact_deg(self) -> float:
+        return float(self.promised("exact_to_deg") or 0)
+
+    @property
+    def invariant_deg(self) -> float:
+        tolerance = self.promised("invariant_to_deg")
+        if tolerance is None:
+            raise NotApplicable("the method does not promise it on noisy data")
+        return float(tolerance)
+
+    def solve(self, problem: Problem, seed: int = 0) -> Floats:
+        return self._rotations(self.solver.solve(problem, seed))
+
+    def solve_in_a_fresh_process(self, problem: Problem, seed: int) -> Floats:
+        """Where hashes, addresses and the state of libraries are others: children of one server share these."""
+        with SingleSolver(self.info, self.solver.parameters, LIMITS) as solver:
+            return self._rotations(solver.solve(problem, seed))
+
+    def _rotations(self, answer: Answer) -> Floats:
+        ended, report, estimate = answer
+        if ended.kind == outcome.NOT_INSTALLED:
+            raise NotApplicable(ended.text)
+        if estimate is None:
+            raise Failed(f"{ended.text} {report.get('log', '').strip()[-300:]}".strip())
+        return estimate.rotations
+
+    def recovers(self, problem: Problem, truth: Floats) -> None:
+        """Fail where the estimate is further from the truth than promised."""
+        _compare(self.solve(problem), truth, self.exact_deg, "from the truth")
+
+    def same(self, problem: Problem, back: Callable[[Floats], Floats]) -> None:
+        """Fail where the answer to `problem`, mapped back, is not that to the original noisy problem."""
+        original, _ = _noisy()
+        _compare(back(self.solve(problem)), self.solve(original), self.invariant_deg, "from the first answer")
+
+
+def _two_cameras(kit: _Kit) -> None:
+    """The smallest problem: the answer is the measurement."""
+    kit.recovers(*_exact(2, [(0, 1)]))
+
+
+def _triangle(kit: _Kit) -> None:
+    kit.recovers(*_exact(3, [(0, 1), (0, 2), (1, 2)]))
+
+
+def _ring(kit: _Kit) -> None:
+    kit.recovers(*_exact(8, [(i, i + 1) for i in range(7)] + [(0, 7)]))
+
+
+def _tree(kit: _Kit) -> None:
+    kit.recovers(*_exact(7, [((i - 1) // 2, i) for i in range(1, 7)]))
+
+
+def _exact_recovery(kit: _Kit) -> None:
+    """A noise-free graph with about half of its edges."""
+    kit.recovers(*_exact(CAMERAS, _half_of_the_edges()))
+
+
+def _reference(kit: _Kit) -> None:
+    """Its key is in a bibliography."""
+    if not cite_keys(kit.info):
+        raise NotApplicable("declares no reference (cite=)")
+    try:
+        references(kit.info)
+    except InputError as error:
+        raise Failed(str(error)) from error
+
+
+def _disconnected_graph(kit: _Kit) -> None:
+    """The largest component is solved, the rest is left out."""
+    edges = [(i, j) for i in range(5) for j in range(i + 1, 5)] + [(5, 6)]
+    problem, truth = _exact(7, edges)
+    rotations = kit.solve(problem)
+    if not np.isnan(rotations[5:]).all():
+        raise Failed("cameras outside the largest component were given rotations")
+    _compare(rotations[:5], truth[:5], kit.exact_deg, "from the truth on the largest component")
+
+
+def _relabelled_cameras(kit: _Kit) -> None:
+    problem, _ = _noisy()
+    order = np.random.default_rng(1).permutation(problem.n)
+    relabelled, _ = problem.subgraph(order)
+    kit.same(relabelled, lambda rotations: rotations[np.argsort(order)])
+
+
+def _permuted_edges(kit: _Kit) -> None:
+    problem, _ = _noisy()
+    order = np.random.default_rng(2).permutation(problem.m)
+    kit.same(Problem(problem.n, problem.edges[order], problem.rotations[order]), lambda rotations: rotations)
+
+
+def _reversed_edges(kit: _Kit) -> None:
+    """Cameras in the opposite order, so that every edge is measured from its other end."""
+    problem, _ = _noisy()
+    edges, rotations = oriented(problem.n - 1 - problem.edges, problem.rotations)
+    kit.same(Problem(problem.n, edges, rotations), lambda rotations: rotations[::-1])
+
+
+def _rotated_frames(kit: _Kit) -> None:
+    """The frame of every camera turned by one rotation S: R_i becomes S R_i, R_ij becomes S R_ij S^T."""
+    problem, _ = _noisy()
+    turn = so3.exp(np.array([0.3, -1.1, 0.7]))
+    turned = Problem(problem.n, problem.edges, turn @ problem.rotations @ turn.T)
+    kit.same(turned, lambda rotations: turn.T @ rotations)
+
+
+def _same_seed_same_answer(kit: _Kit) -> None:
+    problem, _ = _noisy()
+    if not np.array_equal(kit.solve(problem, seed=3), kit.solve(problem, seed=3)):
+        raise Failed("the same problem and seed gave different estimates")
+
+
+def _deterministic_as_declared(kit: _Kit) -> None:
+    if not kit.promised("deterministic"):
+        raise NotApplicable("declared as not deterministic")
+    problem, _ = _noisy()
+    first = kit.solve(problem, seed=3)
+    if not np.array_equal(first, kit.solve(problem, seed=4)):
+        raise Failed("declared deterministic, but the seed changes the estimate")
+    if not np.array_equal(first, kit.solve_in_a_fresh_process(problem, seed=3)):
+        raise Failed("declared deterministic, but another process gives another estimate")
+
+
+CHECKS: tuple[Callable[[_Kit], None], ...] = (
+    _two_cameras,
+    _triangle,
+    _ring,
+    _tree,
+    _exact_recovery,
+    _disconnected_graph,
+    _relabelled_cameras,
+    _permuted_edges,
+    _reversed_edges,
+    _rotated_frames,
+    _same_seed_same_answer,
+    _deterministic_as_declared,
+    _reference,
+)
+
+
+def _compare(found: Floats, wanted: Floats, tolerance_deg: float, what: str) -> None:
+    if np.isnan(found).any():
+        raise Failed(f"{np.isnan(found).all(axis=(1, 2)).sum()} cameras of a connected graph were not solved")
+    gauge = so3.chordal_mean(np.swapaxes(found, -1, -2) @ wanted)
+    worst = np.degrees(so3.angle_between(found @ gauge, wanted).max())
+    if worst > tolerance_deg:
+        raise Failed(f"a camera is {worst:.3g} degrees {what}; the method promises {tolerance_deg:g}")
+
+
+def _exact(n: int, edges: list[tuple[int, int]]) -> tuple[Problem, Floats]:
+    truth = so3.random(np.random.default_rng(n), n)
+    i, j = np.array(edges).T
+    return Problem(n, np.array(edges), truth[i] @ np.swapaxes(truth[j], -1, -2)), truth
+
+
+def _half_of_the_edges() -> list[tuple[int, int]]:
+    pairs = [(i, j) for i in range(CAMERAS) for j in range(i + 1, CAMERAS)]
+    chosen = np.random.default_rng(0).random(len(pairs)) < 0.5
+    ring = {(i, i + 1) for i in range(CAMERAS - 1)}
+    return [pair for pair, keep in zip(pairs, chosen, strict=True) if keep or pair in ring]
+
+
+def _noisy() -> tuple[Problem, Floats]:
+    exact, truth = _exact(CAMERAS, _half_of_the_edges())
+    rng = np.random.default_rng(5)
+    noise = so3.exp(np.radians(NOISE_DEG) * rng.standard_normal((exact.m, 3)))
+    return Problem(exact.n, exact.edges, exact.rotations @ noise), truth

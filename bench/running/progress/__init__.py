@@ -1,0 +1,1 @@
+"""The live table of a run and its estimate of the time left."""

@@ -1,0 +1,254 @@
+"""The scores of stored estimates, kept beside them so that a table over a million records answers at once.
+
+What is kept can be computed again from the records at any time. It lies in ``RUN/scores/<rule>-<version>``, a
+Parquet file for every batch that was scored; the version is a hash of the scoring code, so that a changed score is
+a new one everywhere. A row is used as long as its record is the file that was scored, by its time of
+modification; no estimate is replaced without its record.
+"""
+
+import contextlib
+import hashlib
+import os
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+import bench
+from bench.core import outcome
+from bench.core.errors import InputError
+from bench.core.problem import Estimate, Floats, Instance
+from bench.scoring.metrics.errors import all_camera_errors
+from bench.scoring.row import NOT_RUN, scored
+from bench.storage.store import AGAIN, Store
+from bench.suite.plan import Job
+
+BATCH = 20_000  # rows of a file
+TOGETHER = 100  # estimates in memory
+INSTANCES = 8  # kept in memory; jobs come instance by instance
+SOURCES = (
+    "core/so3.py",
+    "core/problem.py",
+    "scoring/row.py",
+    "scoring/metrics/alignment.py",
+    "scoring/metrics/errors.py",
+    "scoring/metrics/roc.py",
+)
+
+_TEXT = ("protocol", "status", "stop_reason", "notes")
+_WHOLE = ("n_scored", "n_cameras", "n_edges", "n_solved", "n_checkpoints")
+_NUMBERS = (
+    *("mean_deg", "median_deg", "rms_deg", "p90_deg", "max_deg"),
+    *("within_1_deg", "within_3_deg", "within_5_deg", "within_10_deg", "within_30_deg"),
+    *("solve_s", "peak_mib", "conversion_s", "roc_auc", "residual_mean_deg", "residual_median_deg"),
+    *("cost_l1", "cost_l1_truth", "cost_l2", "cost_l2_truth", "edges_percent", "hardness"),
+    *("cost", "certificate", "min_s", "waited"),
+)
+SCHEMA = pa.schema(
+    [("job", pa.string()), ("stamp", pa.int64())]
+    + [(name, pa.string()) for name in _TEXT]
+    + [(name, pa.int64()) for name in (*_WHOLE, "iterations")]
+    + [(name, pa.float64()) for name in _NUMBERS]
+    + [("has_truth", pa.bool_()), ("round_s", pa.list_(pa.float64())), ("instance_notes", pa.list_(pa.string()))]
+)
+ERRORS = pa.field("errors", pa.list_(pa.float64()))
+
+_Read = tuple[tuple[Job, int], Instance, Mapping[str, Any], Estimate | None]
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Rows of jobs, in their order, and the camera errors behind them.
+
+    Parameters
+    ----------
+    table
+        As `SCHEMA` says.
+    unreadable
+        A sentence for every record or estimate that cannot be read; such jobs count as not run.
+    """
+
+    table: pa.Table
+    unreadable: tuple[str, ...]
+    _parts: tuple["_Part", ...]
+    _places: Any
+
+    def where(self, mask: Any) -> "Scores":
+        """Only the rows (k,) where the mask is True."""
+        if mask.all():
+            return self
+        chosen = pa.array(np.flatnonzero(mask))
+        return Scores(self.table.take(chosen), self.unreadable, self._parts, self._places[mask])
+
+    def errors(self, rows: Any) -> list[Floats]:
+        """Errors (n,) in degrees of the rows asked for; NaN where not scored, empty without ground truth."""
+        wanted = self._places[rows]
+        out: list[Floats] = [np.empty(0)] * len(wanted)
+        offset = 0
+        for part in self._parts:
+            mine = np.flatnonzero((wanted >= offset) & (wanted < offset + part.table.num_rows))
+            if len(mine):
+                column = part.errors()
+                for k in mine:
+                    out[k] = column[int(wanted[k]) - offset].values.to_numpy()
+            offset += part.table.num_rows
+        return out
+
+
+def scores_of(store: Store, jobs: Sequence[Job], rule: str) -> Scores:
+    """Scores of jobs, computed where they are not kept yet, and kept where the folder can be written."""
+    folder = store.folder / "scores" / f"{rule}-{_version()}"
+    parts = [part for path in sorted(folder.glob("*.parquet")) if (part := _read(path))]
+    ids = pa.array([job.id for job in jobs], pa.string())
+    stamps = _stamps(store, jobs)
+    found = _located(parts, ids, stamps)
+    scorer = _Scorer(store, rule)
+    todo = np.flatnonzero((found < 0) & (stamps >= 0)).tolist()
+    for start in range(0, len(todo), BATCH):
+        rows = scorer.rows([(jobs[k], int(stamps[k])) for k in todo[start : start + BATCH]])
+        if rows:
+            parts.append(_kept(_tabulated(rows), folder))
+    if scorer.unreadable:
+        stamps[[job.id in scorer.unreadable for job in jobs]] = -1
+    absent = [(jobs[k], -1) for k in np.flatnonzero(stamps < 0).tolist()]
+    if absent:
+        parts.append(_Part(_tabulated(scorer.rows(absent))))
+    if todo or absent:
+        found = _located(parts, ids, stamps)
+    table = pa.concat_tables([part.table for part in parts] or [SCHEMA.empty_table()])
+    if not np.array_equal(found, np.arange(table.num_rows)):
+        table = table.take(pa.array(found))
+    return Scores(table, tuple(scorer.unreadable.values()), tuple(parts), found)
+
+
+class _Scorer:
+    def __init__(self, store: Store, rule: str) -> None:
+        self.store = store
+        self.rule = rule
+        self.instance = lru_cache(INSTANCES)(store.instance)
+        self.unreadable: dict[str, str] = {}
+
+    def rows(self, jobs: Sequence[tuple[Job, int]]) -> list[dict[str, Any]]:
+        """Score jobs, each with the stamp of its record; those whose record cannot be read are left out and told."""
+        return [row for k in range(0, len(jobs), TOGETHER) for row in self._rows(jobs[k : k + TOGETHER])]
+
+    def _rows(self, jobs: Sequence[tuple[Job, int]]) -> Iterator[dict[str, Any]]:
+        read = [found for job, stamp in jobs if (found := self._read(job, stamp))]
+        solved = [(estimate.rotations, i.truth) for _, i, _, estimate in read if estimate and i.truth is not None]
+        errors = iter(all_camera_errors(solved, self.rule))
+        for (job, stamp), instance, record, estimate in read:
+            of_job = np.full(instance.problem.n, np.nan) if instance.truth is not None else np.empty(0)
+            if estimate is not None and instance.truth is not None:
+                of_job = next(errors)
+            try:
+                row = scored(instance, record, estimate, of_job)
+                yield {**row, "job": job.id, "stamp": stamp, **_typed(row)}
+            except (TypeError, ValueError, KeyError, AttributeError) as error:
+                self._tell(job, f"{self.store.record_path(job.id)} cannot be read ({error}); {AGAIN}")
+
+    def _read(self, job: Job, stamp: int) -> _Read | None:
+        try:
+            record = (self.store.record(job.id) if stamp >= 0 else None) or NOT_RUN
+            estimate = self.store.estimate(job.id, record) if record["outcome"] == outcome.OK else None
+        except InputError as error:
+            self._tell(job, str(error))
+            return None
+        instance = self.instance(job.instance_key)
+        if estimate is not None and len(estimate.rotations) != instance.problem.n:
+            self._tell(job, f"{self.store.estimate_path(job.id)} does not fit its instance; {AGAIN}")
+            return None
+        return (job, stamp), instance, record, estimate
+
+    def _tell(self, job: Job, sentence: str) -> None:
+        self.unreadable[job.id] = sentence
+
+
+@cache
+def _version() -> str:
+    """Hash of the code that scores."""
+    here = Path(bench.__file__).parent
+    return hashlib.sha256(b"".join((here / name).read_bytes() for name in SOURCES)).hexdigest()[:12]
+
+
+def _stamps(store: Store, jobs: Sequence[Job]) -> Any:
+    """When each record was written, in nanoseconds; -1 where there is none."""
+    folder = os.fspath(store.record_path("").parent)  # as text: a million paths are slow to build
+
+    def stamp(job_id: str) -> int:
+        try:
+            return os.stat(f"{folder}/{job_id[:2]}/{job_id}.json").st_mtime_ns
+        except FileNotFoundError:
+            return -1
+
+    return np.array([stamp(job.id) for job in jobs], dtype=np.int64)
+
+
+class _Part:
+    """A batch of rows; its errors stay on disk until they are asked for."""
+
+    def __init__(self, table: pa.Table, path: Path | None = None) -> None:
+        self.table = table.select(SCHEMA.names)
+        self.path = path
+        self.held = None if path else table.column("errors")
+
+    def errors(self) -> pa.ChunkedArray:
+        """The column of errors."""
+        return self.held if self.held is not None else pq.read_table(self.path, columns=["errors"]).column("errors")
+
+
+def _read(path: Path) -> _Part | None:
+    """A batch on disk; None where it cannot be read, so that its jobs are scored again."""
+    try:
+        return _Part(pq.read_table(path, columns=SCHEMA.names, memory_map=False).cast(SCHEMA), path)
+    except (OSError, pa.ArrowException, KeyError):
+        return None
+
+
+def _kept(table: pa.Table, folder: Path) -> _Part:
+    """A new batch, on disk where that can be written, else in memory."""
+    path = folder / f"{uuid.uuid4().hex}.parquet"
+    temporary = path.with_suffix(".part")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        pq.write_table(table, temporary)
+        temporary.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        return _Part(table)
+    return _Part(table, path)
+
+
+def _located(parts: Sequence[_Part], ids: pa.StringArray, stamps: Any) -> Any:
+    """Where each job's row is in the parts laid end to end; -1 where there is none of today's record."""
+    found = np.full(len(ids), -1)
+    offset = 0
+    for part in parts:
+        at = pc.index_in(ids, value_set=part.table.column("job")).fill_null(-1).to_numpy()
+        known = part.table.column("stamp").to_numpy()
+        fits = (at >= 0) & (found < 0)
+        fits[fits] = known[at[fits]] == stamps[fits]
+        found[fits] = at[fits] + offset
+        offset += part.table.num_rows
+    return found
+
+
+def _typed(row: dict[str, Any]) -> dict[str, Any]:
+    """The row with numbers where `SCHEMA` has numbers; raises ValueError or TypeError where a record has none."""
+
+    def typed(names: Sequence[str], kind: type) -> dict[str, Any]:
+        return {name: None if row.get(name) is None else kind(row[name]) for name in names}
+
+    numbers, whole, text = typed(_NUMBERS, float), typed((*_WHOLE, "iterations"), int), typed(_TEXT, str)
+    return row | numbers | whole | text | {"round_s": [float(s) for s in row["round_s"]]}
+
+
+def _tabulated(rows: Sequence[Mapping[str, Any]]) -> pa.Table:
+    return pa.Table.from_pylist(list(rows), SCHEMA.append(ERRORS))

@@ -1,0 +1,194 @@
+"""Who comes first over many problems, and how sure that is: ranks, their probabilities, Friedman and post-hoc tests."""
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from bench.core.problem import Floats
+from bench.scoring.inference.blocks import Blocks, Configured
+from bench.scoring.inference.difference import LEVEL, holm
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PostHoc = Literal["nemenyi", "wilcoxon"]
+
+RESAMPLES = 2000
+FAILED = 1e12  # beyond any error or time: two failures are equal
+
+
+def ranks(values: Floats) -> Floats:
+    """(b, k) ranks of k methods on each of b problems, 1 the best; methods that tie share the mean of their ranks."""
+    from scipy.stats import rankdata
+
+    return np.asarray(rankdata(values, axis=1))
+
+
+def rank_probabilities(blocks: Blocks) -> Floats:
+    """(k, k) probability that a method (row) comes first, second and so on (column), by a bootstrap over problems.
+
+    Each resample draws scenes with replacement and, within each, its problems (where seeds made several), and orders
+    the methods by their mean rank over what was drawn. Methods that tie share the places they take. As with every
+    bootstrap, three scenes hardly know how scenes differ: near-certainty from few means little.
+    """
+    from scipy.stats import rankdata
+
+    rng = np.random.default_rng(0)
+    by_scene = _by_scene(blocks)
+    count = len(blocks.methods)
+    drawn = np.zeros((RESAMPLES, count))
+    for total in drawn:
+        for scene in rng.integers(len(by_scene), size=len(by_scene)):
+            members = by_scene[scene]
+            total += members[rng.integers(len(members), size=len(members))].mean(axis=0)
+    drawn = drawn.round(9)
+    low, high = (rankdata(drawn, method=how, axis=1)[..., None] for how in ("min", "max"))
+    place = np.arange(1, count + 1)
+    inside = (low <= place) & (place <= high)
+    return np.asarray((inside / inside.sum(axis=2, keepdims=True)).mean(axis=0))
+
+
+def _by_scene(blocks: Blocks) -> list[Floats]:
+    """Ranks (problems, methods) of each scene."""
+    own, scene_of = ranks(blocks.values), np.asarray(blocks.scenes)
+    return [own[scene_of == scene] for scene in np.unique(scene_of)]
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalDifference:
+    """Mean ranks and which of them cannot be told apart (Demsar, JMLR 7, 2006).
+
+    Parameters
+    ----------
+    methods
+        (k,) by mean rank, the best first.
+    mean_ranks
+        (k,) over the problems.
+    problems
+        How many.
+    friedman_p
+        P value of Friedman's test that all methods are equally good.
+    critical_difference
+        Of mean ranks, by Nemenyi's test.
+    p_values
+        (k, k) of pairs of methods: Nemenyi's, or Wilcoxon's signed ranks after Holm's correction.
+    groups
+        First and last position of each longest run of methods of which no two are told apart.
+    """
+
+    methods: tuple[Configured, ...]
+    mean_ranks: Floats
+    problems: int
+    friedman_p: float
+    critical_difference: float
+    p_values: Floats
+    groups: tuple[tuple[int, int], ...]
+
+
+def critical_difference(blocks: Blocks, post_hoc: PostHoc = "nemenyi", level: float = LEVEL) -> CriticalDifference:
+    """Friedman's test and, where it finds a difference, pairwise tests after it.
+
+    Nemenyi's test compares mean ranks with the studentized range and so depends on which other methods take part;
+    Wilcoxon's signed ranks with Holm's correction do not (Benavoli, Corani and Mangili, JMLR 17, 2016), but cannot tell
+    anything from fewer than six problems.
+
+    Parameters
+    ----------
+    blocks
+        At least two methods and problems.
+    post_hoc
+        The pairwise test.
+    level
+        Of all tests.
+    """
+    own = ranks(blocks.values)
+    order = np.argsort(own.mean(axis=0), kind="stable")
+    own, values = own[:, order], blocks.values[:, order]
+    mean, problems = own.mean(axis=0), len(own)
+    friedman = friedman_p(own)
+    p = _nemenyi(mean, problems) if post_hoc == "nemenyi" else _wilcoxon(values)
+    together = np.ones_like(p, dtype=bool) if not friedman < level else ~(p < level)
+    return CriticalDifference(
+        methods=tuple(blocks.methods[k] for k in order),
+        mean_ranks=mean,
+        problems=problems,
+        friedman_p=friedman,
+        critical_difference=_nemenyi_difference(len(mean), problems, level),
+        p_values=p,
+        groups=tuple(_runs(together)),
+    )
+
+
+def friedman_p(own: Floats) -> float:
+    """P value of Friedman's test in the form of Iman and Davenport (1980), from ranks (problems, methods) with ties."""
+    from scipy.special import fdtrc
+
+    problems, methods = own.shape
+    between = problems * ((own.mean(axis=0) - (methods + 1) / 2) ** 2).sum()
+    within = ((own - (methods + 1) / 2) ** 2).sum() / (problems * (methods - 1))
+    if within == 0:
+        return 1.0
+    chi = between / within
+    left = problems * (methods - 1) - chi
+    if left <= 1e-9:
+        return 0.0
+    return float(fdtrc(methods - 1, (methods - 1) * (problems - 1), (problems - 1) * chi / left))
+
+
+def _nemenyi_difference(methods: int, problems: int, level: float) -> float:
+    from scipy.stats import studentized_range
+
+    return float(studentized_range.ppf(1 - level, methods, np.inf)) * _error(methods, problems)
+
+
+def _nemenyi(mean: Floats, problems: int) -> Floats:
+    from scipy.stats import studentized_range
+
+    apart = np.abs(mean[:, None] - mean) / _error(len(mean), problems)
+    return np.asarray(studentized_range.sf(apart, len(mean), np.inf))
+
+
+def _error(methods: int, problems: int) -> float:
+    return float(np.sqrt(methods * (methods + 1) / (12 * problems)))
+
+
+def _wilcoxon(values: Floats) -> Floats:
+    from scipy.stats import wilcoxon
+
+    count = values.shape[1]
+    pairs = list(combinations(range(count), 2))
+    logs = np.log(np.minimum(values, FAILED))
+    differences = [logs[:, i] - logs[:, j] for i, j in pairs]
+    raw = [float(wilcoxon(d, method="auto").pvalue) if d.any() else 1.0 for d in differences]
+    p = np.ones((count, count))
+    for (i, j), value in zip(pairs, holm(raw), strict=True):
+        p[i, j] = p[j, i] = value
+    return p
+
+
+def _runs(together: "np.ndarray[tuple[int, int], np.dtype[np.bool_]]") -> list[tuple[int, int]]:
+    """Longest runs of two or more neighbours of which all pairs are together."""
+    found: list[tuple[int, int]] = []
+    for first in range(len(together)):
+        last = first
+        while last + 1 < len(together) and together[first : last + 2, first : last + 2].all():
+            last += 1
+        if last > first and (not found or last > found[-1][1]):
+            found.append((first, last))
+    return found
+
+
+def rank_frame(blocks: Blocks) -> "pd.DataFrame":
+    """``method, params, mean_rank, p_rank_1 ... p_rank_k``, by mean rank over scenes: what a heat strip shows."""
+    import pandas as pd
+
+    mean = np.mean([own.mean(axis=0) for own in _by_scene(blocks)], axis=0)
+    probabilities = rank_probabilities(blocks)
+    heads = [f"p_rank_{place}" for place in range(1, len(mean) + 1)]
+    rows = [
+        {"method": method, "params": params, "mean_rank": float(mean[k]), **dict(zip(heads, own, strict=True))}
+        for k, ((method, params), own) in enumerate(zip(blocks.methods, probabilities.tolist(), strict=True))
+    ]
+    return pd.DataFrame(rows).sort_values("mean_rank", kind="stable", ignore_index=True)

@@ -1,0 +1,255 @@
+"""Score what a run has stored: the table of rows, the per-camera errors behind it, ties and footnotes."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow.compute as pc
+
+from bench.core.problem import Floats
+from bench.plugins.selection import format_parameters, parse
+from bench.scoring.cache import Scores, scores_of
+from bench.scoring.inference.seed_ties import MANY_SEEDS, tied_by_seed
+from bench.scoring.inference.statistics import tied
+from bench.scoring.metrics.errors import summary
+from bench.scoring.metrics.oracle import ORACLE, Curve, curve
+from bench.scoring.metrics.speedup import speedup
+from bench.storage.store import Store
+from bench.suite.plan import Job, newest
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+Place = tuple[str, str, str]
+Configured = tuple[str, str]
+PLACE = ["dataset", "instance", "protocol"]
+CONFIGURED = ["method", "params"]
+TIMES = ["round_s", "min_s", "waited"]
+HIDDEN = ["stamp", "n_checkpoints", "has_truth", "instance_notes"]  # what is known of a job besides its row
+
+
+@dataclass(frozen=True)
+class Results:
+    """A scored run.
+
+    Parameters
+    ----------
+    frame
+        One row for each (instance, method, parameters, seed) that was planned, whatever became of it.
+    errors
+        For each place and each configured method, its per-camera errors (n,) in degrees, one array a seed.
+    ties
+        For each place, the configured methods that cannot be told apart from the best.
+    footnotes
+        What a reader must know: notes on instances, and data that were not found.
+    alignment
+        The rule that removed the gauge.
+    curves
+        For each place and each configured method that gave checkpoints, the errors along them, one curve a seed; empty
+        where they were not asked for.
+    """
+
+    frame: "pd.DataFrame"
+    errors: Mapping[Place, Mapping[Configured, tuple[Floats, ...]]]
+    ties: Mapping[Place, set[Configured]]
+    footnotes: tuple[str, ...]
+    alignment: str
+    curves: Mapping[Place, Mapping[Configured, Sequence[Curve]]]
+
+
+def score(
+    store: Store,
+    rule: str = "l1",
+    protocol: str | None = None,
+    jobs: Sequence[Job] | None = None,
+    *,
+    oracle: bool = False,
+    checkpoints: bool = False,
+) -> Results:
+    """Score what is stored of a run; nothing is run.
+
+    Parameters
+    ----------
+    store
+        The run.
+    rule
+        One of `bench.scoring.metrics.alignment.RULES`.
+    protocol
+        Keep the instances of one protocol only, and those of datasets that have none.
+    jobs
+        Only these; by default every job that was ever planned.
+    checkpoints
+        Score the checkpoints too, which takes their number times as long, for `Results.curves`.
+    oracle
+        Score them and add a row for the best checkpoint of every estimate that has checkpoints. Its parameters end in
+        ``oracle``, and it takes no part in ties.
+    """
+    plans = store.plans()
+    jobs = newest(plans) if jobs is None else jobs
+    scores = scores_of(store, jobs, rule)
+    if protocol is not None:
+        fits = np.isin(scores.table["protocol"].to_numpy(), [protocol, "all"])
+        jobs, scores = list(itertools.compress(jobs, fits)), scores.where(fits)
+    frame = _frame(jobs, scores.table, rule)
+    errors = CameraErrors(frame, scores)
+    ties = {place: _ties(errors, place, frame) for place in errors}
+    if "round_s" in frame:
+        _compare_times(frame, plans[-1].baseline)
+    curves: dict[Place, dict[Configured, list[Curve]]] = {}
+    if checkpoints or oracle:
+        along = _along(store, jobs, scores.table, rule)
+        for k, one in along.items():
+            place, method = tuple(frame.loc[k, PLACE]), tuple(frame.loc[k, CONFIGURED])
+            curves.setdefault(place, {}).setdefault(method, []).append(one)
+        if oracle:
+            frame = _with_oracle(frame, along)
+    footnotes = [*_instance_notes(frame, scores.table), *scores.unreadable, *(plans[-1].missing if plans else ())]
+    return Results(frame, errors, ties, tuple(footnotes), rule, curves)
+
+
+class CameraErrors(Mapping[Place, Mapping[Configured, tuple[Floats, ...]]]):
+    """Camera errors of scored jobs, read when they are asked for.
+
+    For each place that has ground truth and each configured method, its errors (n,) in degrees, one array a seed.
+    """
+
+    def __init__(self, frame: "pd.DataFrame", scores: Scores) -> None:
+        self._scores = scores
+        self.rows: dict[Place, dict[Configured, list[int]]] = {}
+        known = scores.table["has_truth"].to_numpy()
+        groups = frame.groupby([*PLACE, *CONFIGURED], sort=False, dropna=False).indices
+        for key, rows in sorted(groups.items(), key=lambda group: group[1][0]):
+            if known[rows].any():
+                self.rows.setdefault(key[:3], {})[key[3:]] = rows.tolist()
+
+    def __getitem__(self, place: Place) -> dict[Configured, tuple[Floats, ...]]:
+        return self.of(place)
+
+    def of(self, place: Place, seeds: int | None = None) -> dict[Configured, tuple[Floats, ...]]:
+        """Errors of a place under the first so many seeds."""
+        return {method: tuple(self._scores.errors(rows[:seeds])) for method, rows in self.rows[place].items()}
+
+    def __iter__(self) -> Iterator[Place]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+def _frame(jobs: Sequence[Job], table: "pa.Table", rule: str) -> "pd.DataFrame":
+    """One row a job: what was asked for, and how it scored."""
+    import pandas as pd
+
+    spelled: dict[int, str] = {}  # jobs of one configuration share their parameters
+    params = [
+        spelled.get(id(job.parameters)) or spelled.setdefault(id(job.parameters), format_parameters(job.parameters))
+        for job in jobs
+    ]
+    datasets = {name: parse(name).name for name in {job.dataset for job in jobs}}
+    asked = pd.DataFrame(
+        {
+            "dataset": [datasets[job.dataset] for job in jobs],
+            "instance": [job.instance for job in jobs],
+            "instance_key": [job.instance_key for job in jobs],
+            "method": [job.method for job in jobs],
+            "title": [job.title for job in jobs],
+            "params": params,
+            "seed": [job.seed for job in jobs],
+        }
+    )
+    times = table.select(TIMES).to_pandas() if any(job.rounds for job in jobs) else pd.DataFrame()
+    scored = table.drop_columns([*HIDDEN, *TIMES]).to_pandas()
+    first = ["protocol", "alignment", "status"]
+    scored.insert(0, "alignment", rule)
+    scored = scored[[*first, *(name for name in scored if name not in (*first, "notes", "job")), "notes", "job"]]
+    if not times.empty:
+        times.insert(0, "timing", True)
+        times.insert(1, "rounds", [job.rounds for job in jobs])
+    return pd.concat([asked, scored, times], axis=1)
+
+
+def _instance_notes(frame: "pd.DataFrame", table: "pa.Table") -> list[str]:
+    """Notes on instances, once each, with their names."""
+    notes = table["instance_notes"]
+    noted = np.flatnonzero(pc.list_value_length(notes).to_numpy() > 0)
+    said = {
+        f"{frame['dataset'][k]}/{frame['instance'][k]}: {note}": None for k in noted for note in notes[int(k)].as_py()
+    }
+    return list(said)
+
+
+def _along(store: Store, jobs: Sequence[Job], table: "pa.Table", rule: str) -> dict[int, Curve]:
+    """For each row that has checkpoints, its errors along them."""
+    found = {}
+    for k in np.flatnonzero(table["n_checkpoints"].to_numpy() > 0).tolist():
+        truth = store.instance(jobs[k].instance_key).truth
+        along = None if truth is None else curve(store.estimate(jobs[k].id), truth, rule)
+        if along is not None:
+            found[k] = along
+    return found
+
+
+def _compare_times(frame: "pd.DataFrame", baseline: str) -> None:
+    """Add to every row how many times faster than the baseline on the same problem it was."""
+    rows = frame.to_dict("records")
+
+    def place(row: Mapping[str, Any]) -> Place:
+        return row["dataset"], row["instance"], row["protocol"]
+
+    named = [row for row in rows if f"{row['method']}[{row['params']}]".removesuffix("[]") == baseline]
+    of_seed = {(place(row), row["seed"]): row["round_s"] for row in named}
+    of_any = {place(row): row["round_s"] for row in reversed(named)}  # a deterministic baseline has one seed
+    ratios = []
+    for row in rows:
+        own, base = row["round_s"], of_seed.get((place(row), row["seed"]), of_any.get(place(row), ()))
+        ratios.append(speedup(base, own) if len(own) and len(own) == len(base) else (np.nan, np.nan, np.nan))
+    frame[["speedup", "speedup_low", "speedup_high"]] = np.array(ratios)
+    frame["baseline"] = baseline
+
+
+def _with_oracle(frame: "pd.DataFrame", along: Mapping[int, Curve]) -> "pd.DataFrame":
+    """Add the row of the best checkpoint after the row of each estimate that has checkpoints."""
+    import pandas as pd
+
+    if not along:
+        return frame
+    rows = frame.to_dict("records")
+    added = pd.DataFrame([_oracle_row(rows[k], one) for k, one in along.items()], index=list(along))
+    both = pd.concat([frame, added.astype(frame.dtypes.to_dict(), errors="ignore")]).sort_index(kind="stable")
+    return both.reset_index(drop=True)
+
+
+def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
+    """The row of an estimate's best checkpoint; what only its end has is left out."""
+    pick = along.oracle
+    count = len(along.iterations)
+    absent = dict.fromkeys(
+        (
+            *("peak_mib", "cost", "certificate", "roc_auc", "min_s"),
+            *("speedup", "speedup_low", "speedup_high"),
+            *(k for k in row if k.startswith(("residual", "cost_"))),
+        )
+    )
+    return {
+        **row,
+        **{name: value for name, value in absent.items() if name in row},
+        **({"round_s": ()} if "round_s" in row else {}),
+        **summary(along.errors[pick]),
+        "params": ",".join(filter(None, [row["params"], ORACLE])),
+        "solve_s": along.seconds[pick],
+        "iterations": int(along.iterations[pick]),
+        "stop_reason": ORACLE,
+        "notes": f"{ORACLE}: checkpoint {pick + 1} of {count}, picked by the smallest error against ground truth",
+    }
+
+
+def _ties(errors: CameraErrors, place: Place, frame: "pd.DataFrame") -> set[Configured]:
+    rows = errors.rows[place]
+    same_cameras = frame["instance_key"].iloc[np.concatenate(list(rows.values()))].nunique() == 1
+    if same_cameras or max(map(len, rows.values())) <= MANY_SEEDS:
+        return tied(errors.of(place, MANY_SEEDS), same_cameras=same_cameras)
+    columns = frame[["seed", "median_deg", "mean_deg", "n_scored"]].to_numpy(dtype=float)
+    return tied_by_seed({method: columns[of_method] for method, of_method in rows.items()})

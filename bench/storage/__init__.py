@@ -1,0 +1,1 @@
+"""Plans, instances, records and estimates on disk."""

@@ -1,0 +1,85 @@
+"""Problems and estimates as ``.npz`` files, float64 and unrounded, read without pickle."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.core.errors import InputError, shown
+from bench.core.problem import Checkpoint, Estimate, Problem
+from bench.formats import archive
+
+
+def save_problem(path: Path, problem: Problem) -> None:
+    """Write a problem as uncompressed ``.npz``."""
+    arrays: dict[str, Any] = {"n": problem.n, "edges": problem.edges, "rotations": problem.rotations}
+    if problem.weights is not None:
+        arrays["weights"] = problem.weights
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def load_problem(path: Path) -> Problem:
+    """Read what `save_problem` wrote; raises `InputError` where the file holds something else."""
+    arrays = archive.load(path, ("n", "edges", "rotations", "weights"))
+    try:
+        n = arrays["n"]
+        if n.shape != () or n.dtype.kind not in "iu":
+            raise InputError(f"n must be a whole number, not {n.dtype} of shape {n.shape}")
+        return Problem(int(n), arrays["edges"], arrays["rotations"], arrays.get("weights"))
+    except (KeyError, InputError) as error:
+        raise InputError(f"{path}: {_said(error)}") from error
+
+
+def save_estimate(path: Path, estimate: Estimate) -> None:
+    """Write the arrays of an estimate, float64 and unrounded, as ``.npz``."""
+    arrays: dict[str, Any] = {"rotations": np.asarray(estimate.rotations, dtype=np.float64)}
+    if estimate.edge_weights is not None:
+        arrays["edge_weights"] = np.asarray(estimate.edge_weights, dtype=np.float64)
+    if estimate.checkpoints:
+        arrays["checkpoints"] = np.stack([c.rotations for c in estimate.checkpoints])
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
+    """Read what `save_estimate` wrote, with the scalars that the record holds.
+
+    Raises
+    ------
+    InputError
+        Where the file holds something else, or another number of checkpoints than the record.
+    """
+    arrays = archive.load(path, ("rotations", "edge_weights", "checkpoints"))
+    try:
+        n = len(_floats(arrays["rotations"], (-1, 3, 3)))
+        states = _floats(arrays["checkpoints"], (-1, n, 3, 3)) if "checkpoints" in arrays else ()
+        return Estimate(
+            rotations=arrays["rotations"],
+            edge_weights=_floats(arrays["edge_weights"], (-1,)) if "edge_weights" in arrays else None,
+            iterations=scalars.get("iterations"),
+            stop_reason=scalars.get("stop_reason", ""),
+            cost=scalars.get("cost"),
+            certificate=scalars.get("certificate"),
+            checkpoints=tuple(
+                Checkpoint(rotations=state, **facts)
+                for state, facts in zip(states, scalars.get("checkpoints", ()), strict=True)
+            ),
+            conversion_s=scalars.get("conversion_s", 0.0),
+            notes=tuple(scalars.get("notes", ())),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: {_said(error)}") from error
+
+
+def _floats(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    if array.dtype != np.float64 or array.ndim != len(shape):
+        raise ValueError(f"an array is {array.dtype} of shape {array.shape}")
+    if any(want not in (-1, has) for want, has in zip(shape, array.shape, strict=True)):
+        raise ValueError(f"an array has shape {array.shape}")
+    return array
+
+
+def _said(error: Exception) -> str:
+    return f"there is no array {error}" if isinstance(error, KeyError) else shown(str(error), 200)

@@ -1,0 +1,1 @@
+"""Measurements simulated on the edges of a graph."""

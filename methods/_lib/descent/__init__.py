@@ -1,0 +1,1 @@
+"""Losses, and steps that lower them."""

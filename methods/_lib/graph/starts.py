@@ -1,0 +1,62 @@
+"""Where iterative methods start from, the same for all of them."""
+
+from typing import Literal
+
+import numpy as np
+
+from bench.core import so3
+from bench.core.problem import Floats, Problem
+
+from ... import spectral
+from ...spanning_tree import tree_rotations
+from .cemp import TRIANGLES, corruption_levels, tree_of_least_corruption
+from .triangles import sample_triangles
+
+Start = Literal["spectral", "spanning-tree", "cemp-mst", "random"]
+SEEDED = ("cemp-mst", "random")  # starts that draw from the generator, so that no method is deterministic with them
+TOLERANCE = 1e-2  # radians between the eigenspace found and the true one; a start need not be better
+
+
+class Seeded:
+    """A method that draws nothing but its start."""
+
+    init: str
+
+    @property
+    def deterministic(self) -> bool:
+        """A start that draws from the generator is not."""
+        return self.init not in SEEDED
+
+
+class Started(Seeded):
+    """Promises of a method that depend on its start: a random one may end in another local minimum."""
+
+    @property
+    def exact_to_deg(self) -> float:
+        """Of no use (180) from a random start."""
+        return 180.0 if self.init == "random" else 1e-6
+
+    @property
+    def invariant_to_deg(self) -> float | None:
+        """Nothing from a random start."""
+        return None if self.init == "random" else 1e-3
+
+
+def start_rotations(name: Start, problem: Problem, rng: np.random.Generator) -> Floats:
+    """Rotations (n, 3, 3) to start from.
+
+    Parameters
+    ----------
+    name
+        "spectral": the normalised spectral solution, D regularised by its mean. "spanning-tree": propagation
+        along the tree of `SpanningTree`, the one place where a problem's weights enter. "cemp-mst": propagation
+        along the tree that `CEMP` with its default parameters finds. "random": uniform on SO(3).
+    """
+    if name == "spectral":
+        return spectral.spectral_rotations(problem, regularisation=1.0, tolerance=TOLERANCE)[0]
+    if name == "spanning-tree":
+        return tree_rotations(problem, problem.weights)
+    if name == "cemp-mst":
+        levels = corruption_levels(sample_triangles(problem, TRIANGLES, rng))
+        return tree_of_least_corruption(problem, levels)
+    return so3.random(rng, problem.n)

@@ -1,0 +1,1 @@
+"""Linear algebra: eigenspaces, Laplacian systems, certificates and rounding."""

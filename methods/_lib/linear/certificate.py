@@ -1,0 +1,77 @@
+"""The squared chordal cost and the certificate of its optimum, for every method that minimises it."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bench.core.problem import Floats, Problem
+
+from .smallest import DENSE, smallest_eigenspace
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+PRECISION = 1e-10  # of the eigenvalue, relative to the largest one
+ROUNDING = 4e-15  # of the cost, for each edge
+
+
+def chordal_cost(problem: Problem, rotations: Floats) -> float:
+    """Sum over the edges of the squared Frobenius norm of R_ij - R_i R_j^T."""
+    i, j = problem.edges.T
+    difference = problem.rotations - rotations[i] @ np.swapaxes(rotations[j], -1, -2)
+    return float(np.sum(difference**2))
+
+
+def multipliers(measurements: "sparse.csr_array", rotations: Floats) -> Floats:
+    """Lagrange multipliers (n, 3, 3) of R_i R_i^T = I: the symmetric parts of sum_j R_ij R_j R_i^T.
+
+    Parameters
+    ----------
+    measurements
+        (3n, 3n), the `Problem.block_matrix`.
+    rotations
+        (n, 3, p) with orthonormal rows; p is three, or more where they are relaxed.
+    """
+    gathered = measurements @ rotations.reshape(measurements.shape[0], -1)
+    blocks = gathered.reshape(rotations.shape) @ np.swapaxes(rotations, -1, -2)
+    return 0.5 * (blocks + np.swapaxes(blocks, -1, -2))
+
+
+def certificate_matrix(measurements: "sparse.csr_array", blocks: Floats) -> "sparse.csr_array":
+    """Lambda - G (3n, 3n): `blocks` (n, 3, 3) are the diagonal of Lambda, G holds the measurements."""
+    from scipy import sparse
+
+    n = len(blocks)
+    return sparse.bsr_array((blocks, np.arange(n), np.arange(n + 1))).tocsr() - measurements
+
+
+def smallest_eigenvalue(problem: Problem, rotations: Floats) -> float:
+    """Smallest eigenvalue of Lambda - G, the certificate matrix of `chordal_cost` at the rotations.
+
+    Lambda has the `multipliers` on its diagonal, G holds the measurements. At a global optimum the matrix is
+    positive semidefinite with R in its kernel (Eriksson et al. 2018). The value bounds the gap anywhere,
+    critical point or not: for every feasible X of the relaxation tr(G X) = tr(Lambda X) - tr((Lambda - G) X)
+    <= tr(Lambda) - 3n lambda_min, and tr(Lambda) = tr(G R R^T), so that the cost exceeds the smallest
+    possible one by at most 3n max(0, -lambda_min).
+    """
+    return smallest_eigenpair(problem, rotations)[0]
+
+
+def smallest_eigenpair(problem: Problem, rotations: Floats) -> tuple[float, Floats]:
+    """`smallest_eigenvalue` with its vector, as blocks (n, 3); `rotations` as in `multipliers`."""
+    from scipy import sparse
+    from scipy.sparse.linalg import eigsh
+
+    measurements = problem.block_matrix()
+    certificate = certificate_matrix(measurements, multipliers(measurements, rotations))
+    size = 3 * problem.n
+    start = np.random.default_rng(0).standard_normal((size, 3))
+    if size <= DENSE:
+        values, vectors = smallest_eigenspace(certificate, start)
+        return float(values[0]), vectors[:, 0].reshape(-1, 3)
+    # The row sums bound the spectrum: the smallest eigenvalue becomes the largest of the shifted matrix, and
+    # Lanczos iterations resolve it on the scale of the shift, although it is near zero itself.
+    shift = float(abs(certificate).sum(axis=1).max())
+    shifted = sparse.diags_array(np.full(size, shift)) - certificate
+    largest, vector = eigsh(shifted, k=1, which="LA", v0=start[:, 0], ncv=40, tol=PRECISION, maxiter=5000)
+    return float(shift - largest[0]), vector.reshape(-1, 3)

@@ -1,0 +1,157 @@
+"""Weighted graph Laplacian systems, solved many times on one graph."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bench.core.problem import Floats, Ints, Problem
+
+from ..loops import edge_kernels
+from ..loops.edge_kernels import Singles
+
+if TYPE_CHECKING:
+    from scipy import sparse
+    from scipy.sparse.linalg import SuperLU
+
+SMALL = 200  # cameras; up to here dense factors are fastest whatever the density
+DENSE_SHARE = 0.1  # of all pairs that are edges; from here on dense factors are fastest
+LARGE = 500  # cameras; from here on conjugate gradients are fastest where the graph is well connected
+WELL_CONNECTED = 20  # edges at a camera, on average
+SMALLEST = np.finfo(np.float32).tiny  # in place of zero, under a fraction
+MOST_PRODUCTS = 500  # of conjugate gradients in one system, before it is factored instead
+
+
+class LaplacianSolver:
+    """Least squares over a graph: the x (n, 3) that minimise sum_ij w_ij |x_i - x_j - b_ij|^2.
+
+    The normal matrix is the weighted graph Laplacian, the same for the three columns: it is factored once for
+    each set of weights. The last camera is anchored, and the mean of x is zero. Factors are dense (LAPACK
+    ``posv``) or sparse (SuperLU without pivoting, the matrix being positive definite; the ordering that
+    reduces fill is found once), whichever was measured to be faster at this size and density.
+
+    Where an approximation will do, large graphs with many edges at a camera are not factored: conjugate
+    gradients, preconditioned by the diagonal, single precision. A system that takes them too long is
+    factored after all, and so is every later one.
+
+    Parameters
+    ----------
+    problem
+        A connected problem; only its graph is used.
+    tolerance
+        Residual that is allowed, relative to the right-hand side, in the norm that the inverse of the
+        diagonal gives; zero for factors always.
+    """
+
+    def __init__(self, problem: Problem, tolerance: float = 0.0) -> None:
+        self._problem = problem
+        self._degrees = np.empty(problem.n)
+        self._sums = np.empty((problem.n, 3))
+        well_connected = problem.n >= LARGE and 2 * problem.m >= WELL_CONNECTED * problem.n
+        self._tolerance = tolerance if well_connected else 0.0
+        self._factored = _factored(problem) if self._tolerance == 0 else None
+
+    def solve(self, weights: Floats, vectors: Floats) -> Floats:
+        """Return x (n, 3) for positive `weights` (m,) and `vectors` b (m, 3)."""
+        edge_kernels.divergence(self._problem.edges, weights, vectors, self._degrees, self._sums)
+        x = np.zeros((self._problem.n, 3))
+        if self._factored is None:
+            if _conjugate_gradients(self._problem.edges, weights, self._degrees, self._sums, self._tolerance, x):
+                return x
+            self._factored = _factored(self._problem)
+        x[:-1] = self._factored.solve(weights, self._degrees, self._sums[:-1])
+        x[-1] = 0
+        x -= x.mean(axis=0)
+        return x
+
+
+def _conjugate_gradients(
+    edges: Ints, weights: Floats, degrees: Floats, right: Floats, tolerance: float, x: Floats
+) -> bool:
+    """Fill x (n, 3), of mean zero; whether the residual fell below `tolerance` in time."""
+    w, diagonal, inverse = (a.astype(np.float32) for a in (weights, degrees, 1 / degrees[:, None]))
+    residual = np.zeros((len(x), 4), np.float32)  # three columns, and one of zeros that fills the registers
+    residual[:, :3] = right
+    solution, image = np.zeros_like(residual), np.empty_like(residual)
+    conditioned = inverse * residual
+    direction = conditioned.copy()
+    energy = first = _dots(residual, conditioned)
+    for _ in range(MOST_PRODUCTS):
+        edge_kernels.laplacian_product(edges, w, diagonal, direction, image)
+        length = energy / np.maximum(_dots(direction, image), SMALLEST)
+        solution += length * direction
+        residual -= length * image
+        np.multiply(inverse, residual, out=conditioned)
+        before, energy = energy, _dots(residual, conditioned)
+        if np.all(energy <= tolerance**2 * first):
+            x[:] = solution[:, :3]
+            x -= x.mean(axis=0)
+            return True
+        direction *= energy / np.maximum(before, SMALLEST)
+        direction += conditioned
+    return False
+
+
+def _dots(a: Singles, b: Singles) -> Singles:
+    """Scalar product of each pair of columns."""
+    products: Singles = np.einsum("nk,nk->k", a, b)
+    return products
+
+
+def compile_and_load() -> None:
+    """Compile the kernels that only large graphs need, on two cameras."""
+    problem = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
+    one, zeros = np.ones(2), np.zeros((2, 3))
+    _conjugate_gradients(problem.edges, one[:1], one, zeros, 1.0, zeros)
+
+
+def _factored(problem: Problem) -> "_DenseSystem | _SparseSystem":
+    dense = problem.n <= SMALL or 2 * problem.m > DENSE_SHARE * problem.n**2
+    return _DenseSystem(problem) if dense else _SparseSystem(problem)
+
+
+class _DenseSystem:
+    def __init__(self, problem: Problem) -> None:
+        self._edges = problem.edges
+        self._rows = np.empty((problem.n - 1, problem.n - 1))
+
+    def solve(self, weights: Floats, degrees: Floats, right: Floats) -> Floats:
+        from scipy.linalg import lapack
+
+        edge_kernels.dense_laplacian(self._edges, weights, degrees, self._rows)
+        _, x, info = lapack.dposv(self._rows.T, right, lower=1, overwrite_a=1)
+        if info != 0:
+            raise np.linalg.LinAlgError(f"the Laplacian is not positive definite (row {info})")
+        return np.asarray(x)
+
+
+class _SparseSystem:
+    def __init__(self, problem: Problem) -> None:
+        from scipy import sparse
+
+        size = problem.n - 1
+        i, j = problem.edges.T
+        kept = np.flatnonzero(j < size)
+        i, j, cameras = i[kept], j[kept], np.arange(size)
+        rows, cols = np.concatenate([i, j, cameras]), np.concatenate([j, i, cameras])
+        pattern = sparse.csc_array((np.ones(len(rows)), (rows, cols)), shape=(size, size))
+        pattern.setdiag(problem.degree[:size] + 1.0)
+        place = _factor(pattern, "MMD_AT_PLUS_A").perm_c
+        self._order = np.argsort(place)
+        entries = np.arange(1.0, len(rows) + 1)
+        self._matrix = sparse.csc_array((entries, (place[rows], place[cols])), shape=(size, size))
+        self._matrix.sort_indices()
+        self._entry = self._matrix.data.astype(np.intp) - 1
+        self._kept = kept
+
+    def solve(self, weights: Floats, degrees: Floats, right: Floats) -> Floats:
+        off_diagonal = -weights[self._kept]
+        self._matrix.data = np.concatenate([off_diagonal, off_diagonal, degrees[:-1]])[self._entry]
+        x = np.empty_like(right)
+        x[self._order] = _factor(self._matrix, "NATURAL").solve(right[self._order])
+        return x
+
+
+def _factor(matrix: "sparse.csc_array", ordering: str) -> "SuperLU":
+    from scipy.sparse.linalg import splu
+
+    return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
