@@ -9,6 +9,10 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
+_HERE = Path(__file__).parent
+if not (_HERE / "methods").is_dir():  # a checkout: methods and datasets are the siblings of this bench, and of no other
+    __path__.append(str(_HERE.parent))
+
 
 def run(
     suite: str | None = None,

@@ -1,1 +1,4 @@
 """Rotation synchronization methods: one file, one method."""
+
+if __name__ != "bench.methods":
+    raise ImportError("this folder is bench.methods: import it under that name, with the checkout's root on the path")

@@ -77,7 +77,7 @@ class Faulty:
             if os.fork() == 0:
                 Path(self.mark).write_text(str(os.getpid()))
                 time.sleep(1000)
-            while not (Path(self.mark).exists() and Path(self.mark).read_text()):
+            while not Path(self.mark).read_text().isdecimal():
                 time.sleep(0.01)
         elif self.fault == "memory":
             kept = []
