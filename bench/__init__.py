@@ -1,56 +1,66 @@
-"""The reference benchmark of rotation synchronization (multiple rotation averaging)."""
+"""The reference benchmark of rotation synchronization (multiple rotation averaging).
 
-from collections.abc import Sequence
+What there is for users: `run`, `solve`, `score`, `report`, `catalog`, `Problem`, `Estimate`, `Instance`. What a plug-in
+needs besides: `method`, `dataset`, `parameter`, `Checkpoint`, `Skipped`, `Source`, `Missing`, `InputError`, `so3`,
+`stream`, and the array types `Floats` and `Ints`. Each is imported when it is first used.
+"""
+
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    import pandas as pd
+    from bench.api import report as report
+    from bench.api import run as run
+    from bench.api import score as score
+    from bench.api import solve as solve
+    from bench.core import so3 as so3
+    from bench.core.errors import InputError as InputError
+    from bench.core.problem import Checkpoint as Checkpoint
+    from bench.core.problem import Estimate as Estimate
+    from bench.core.problem import Floats as Floats
+    from bench.core.problem import Instance as Instance
+    from bench.core.problem import Ints as Ints
+    from bench.core.problem import Problem as Problem
+    from bench.core.problem import Skipped as Skipped
+    from bench.core.seeds import stream as stream
+    from bench.plugins.catalog import catalog as catalog
+    from bench.plugins.configure import parameter as parameter
+    from bench.plugins.declare import Missing as Missing
+    from bench.plugins.declare import Source as Source
+    from bench.plugins.declare import dataset as dataset
+    from bench.plugins.declare import method as method
 
-__version__ = "0.1.0"
+__version__ = "0.2.0.dev0"
+
+# Where each name of the door lives.
+HOMES = {
+    **dict.fromkeys(("run", "solve", "score", "report"), "bench.api"),
+    **dict.fromkeys(
+        ("Problem", "Estimate", "Instance", "Checkpoint", "Skipped", "Floats", "Ints"), "bench.core.problem"
+    ),
+    **dict.fromkeys(("method", "dataset", "Source", "Missing"), "bench.plugins.declare"),
+    "catalog": "bench.plugins.catalog",
+    "parameter": "bench.plugins.configure",
+    "InputError": "bench.core.errors",
+    "stream": "bench.core.seeds",
+    "so3": "bench.core.so3",
+}
+__all__ = sorted(HOMES)
 
 _HERE = Path(__file__).parent
 if not (_HERE / "methods").is_dir():  # a checkout: methods and datasets are the siblings of this bench, and of no other
     __path__.append(str(_HERE.parent))
 
 
-def run(
-    suite: str | None = None,
-    methods: Sequence[str] = (),
-    datasets: Sequence[str] = (),
-    *,
-    align: str = "l1",
-    **options: Any,
-) -> "pd.DataFrame":
-    """Run a suite and return its scored rows; the same as ``python -m bench run``, without tables and plots on disk.
+def __getattr__(name: str) -> Any:
+    if name not in HOMES:
+        raise AttributeError(f"module 'bench' has no attribute {name!r}")
+    home = import_module(HOMES[name])
+    found = home if name == "so3" else getattr(home, name)
+    globals()[name] = found
+    return found
 
-    Parameters
-    ----------
-    suite
-        Named suite or TOML file; "quick" where nothing is named.
-    methods, datasets
-        Selections, such as ``"dmf-synch[depth=[2,3]]"``, that replace the suite's or choose among them.
-    align
-        "l1", "chordal", "karcher" or "anchors".
-    options
-        Fields of `bench.running.run.Options`, such as ``out``, ``data_dir``, ``seeds`` and ``jobs``; paths may be
-        strings.
 
-    Returns
-    -------
-    One row for each instance, method, parameters and seed, whatever became of it.
-
-    Raises
-    ------
-    InputError
-        On anything that the caller has to change.
-    """
-    from bench.running.run import Options, Run
-    from bench.scoring.results import score
-
-    paths = {name: Path(options[name]) for name in ("out", "data_dir") if options.get(name) is not None}
-    planned = Run(suite, methods, datasets, Options(**options | paths))
-    planned.prepare()
-    for _ in planned.execute():
-        pass
-    return score(planned.store, align, planned.options.protocol).frame
+def __dir__() -> list[str]:
+    return __all__

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bench.core import seeds, so3
 from bench.core.errors import InputError
 from bench.core.problem import Floats, Instance, Ints, Problem
-from bench.plugins.registry import Source, dataset
+from bench.plugins.declare import Source, dataset
 
 from ._files.folders import revision
 from ._simulated.measurements import CODE, Measurements, OutlierModel

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.core.errors import InputError
+from bench.core.errors import InputError, suggestion
 from bench.core.problem import Floats, Instance, Problem
 from bench.formats.pose_graph import read_pose_graph
-from bench.plugins.registry import Missing, Source, dataset, suggestion
+from bench.plugins.declare import Missing, Source, dataset
 
 from ._files.folders import revision, roots
 from ._simulated.statistics import statistics

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.core import seeds, so3
+from bench.core.errors import suggestion
 from bench.core.problem import Instance, Problem
 from bench.formats.npz import read_topology
-from bench.plugins.registry import Missing, Source, dataset, suggestion
+from bench.plugins.declare import Missing, Source, dataset
 
 from ._files.folders import revision, roots
 from ._simulated.measurements import CODE, Measurements, OutlierModel

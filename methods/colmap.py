@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from ._lib.stopwatch import Stopwatch
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.core.problem import Checkpoint, Estimate, Floats, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from . import spectral
 from ._lib.dmf import crdmf_dense, dmf_thin

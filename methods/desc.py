@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from . import spectral
 from ._lib.descent.simplex_descent import consistent_levels

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from bench.core.problem import Checkpoint, Estimate, Floats, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from . import spectral
 from ._lib.dmf import dmf_dense, dmf_thin

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from bench.core.problem import Estimate, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from . import spectral
 from ._lib.graph.starts import Start, Started, start_rotations

@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.core import so3
 from bench.core.problem import Estimate, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from . import spectral
 from ._lib.descent.descent import Descent

@@ -7,7 +7,7 @@ import numpy as np
 
 from bench.core import so3
 from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from . import spectral
 from ._lib.graph.starts import Seeded, Start, start_rotations

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from bench.core import so3
 from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from ._lib.graph.starts import Seeded, Start, start_rotations
 from .spectral import compile_and_load

@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.core import so3
 from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from ._lib.graph.starts import Start, Started, start_rotations
 from ._lib.linear.davidson import block_laplacian, smallest_eigenspace

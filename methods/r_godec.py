@@ -7,7 +7,7 @@ import numpy as np
 
 from bench.core import so3
 from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from ._lib.graph.starts import TOLERANCE, Seeded, Start, start_rotations
 from ._lib.loops import edge_kernels

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.core.problem import Estimate, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from . import spectral
 from ._lib.graph.neighbours import neighbours_of

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from ._lib.linear.certificate import chordal_cost, multipliers, smallest_eigenvalue
 from ._lib.linear.rounding import rounded

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from bench.core.problem import Estimate, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 from ._lib.gtsam_values import rotations_of, values_of
 from ._lib.linear.certificate import chordal_cost, smallest_eigenvalue

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bench.core import so3
 from bench.core.problem import Estimate, Floats, Ints, Problem
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 if TYPE_CHECKING:
     from scipy import sparse

@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Floats, Problem
-from bench.plugins.registry import method
+from bench import Floats, Problem, method, so3
 
 
 @method("chaos", title="Chaos", deterministic=False)

@@ -46,10 +46,7 @@ import os, signal, sys, time
 from dataclasses import dataclass
 from pathlib import Path
 import numpy as np
-from bench.core import so3
-from bench.core.problem import Estimate, Instance, Problem, Skipped
-from bench.plugins.registry import Source, dataset, method
-from bench.core.seeds import stream
+from bench import Estimate, Instance, Problem, Skipped, Source, dataset, method, so3, stream
 
 
 @method("faulty", title="Faulty", deterministic=False)

@@ -16,7 +16,7 @@ import numpy as np
 from scenes import UNREGISTERED, bundle_camera, egs_line, write_scene
 
 from bench.core import so3
-from bench.core.errors import InputError
+from bench.core.errors import InputError, suggestion
 from bench.core.problem import Instance, Problem
 from bench.datasets._files.archive import damaged, unpack
 from bench.datasets._files.download import Archive
@@ -27,7 +27,8 @@ from bench.formats.npz import read_topology
 from bench.formats.one_dsfm import read_bundle
 from bench.papers.layout import load_layout
 from bench.papers.published import read_published
-from bench.plugins import registry, selection
+from bench.plugins import selection
+from bench.plugins.catalog import catalog, scan
 from bench.storage.store import Store
 from bench.suite.experiment import load_suite
 from bench.suite.plan import Job, Plan, encode
@@ -116,10 +117,10 @@ def _plugin(data: bytes, folder: Path) -> object:
     path.write_bytes(data)
     before = set(sys.modules)
     try:
-        found = registry.scan("method", [str(path)])
+        found = scan("method", [str(path)])
         assert found.entries or found.broken.keys() <= {str(path)}
         assert not any("\n" in why for why in found.broken.values())
-        return [(info.summary, info.not_installed, registry.suggestion("x", found.entries)) for info in found]
+        return [(info.summary, info.not_installed, suggestion("x", found.entries)) for info in found]
     finally:
         for name in set(sys.modules) - before:
             del sys.modules[name]
@@ -191,7 +192,7 @@ RESULT = {
     "warnings": ["UserWarning: x"],
     **SCALARS,
 }
-METHODS = registry.catalog("method")
+METHODS = catalog("method")
 
 EGS = "\n".join(egs_line(i, j, r) for (i, j), r in zip(EDGES.tolist(), MEASURED, strict=True))
 QUATERNION = "0 0 0 0.5 0.5 0.5 0.5"
@@ -210,7 +211,7 @@ POINT = "1 2 3\n255 255 255\n1 0 1 0.5 0.5\n"
 BUNDLE = f"# Bundle file v0.3\n3 1\n{CAMERA}{UNREGISTERED}{CAMERA}{POINT}"
 PLUGIN = """from dataclasses import dataclass
 from typing import Literal
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 @method("mine", title="Mine", cite="", requires=("numpy",), install="", robust=True, max_cameras=5)
 @dataclass(frozen=True)

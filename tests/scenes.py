@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.core import so3
 from bench.core.problem import Floats, Instance, Ints
-from bench.plugins.registry import Dataset, Source
+from bench.plugins.declare import Dataset, Source
 
 UNREGISTERED = "1 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
 

@@ -7,8 +7,8 @@ import pytest
 from commands import bench
 
 from bench.core.errors import InputError
+from bench.plugins.catalog import catalog
 from bench.plugins.references import BENCHMARK, bibliography, cite_keys, read_entries, references
-from bench.plugins.registry import catalog
 from bench.running.conformance import check_method
 
 BIBLIOGRAPHY = Path(__file__).parent.parent / "methods" / "references.bib"

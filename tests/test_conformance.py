@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from bench.methods._lib.graph.starts import SEEDED
-from bench.plugins import registry
+from bench.plugins.catalog import catalog
 from bench.running.conformance import CHECKS, check_method
 
-METHODS = registry.catalog("method")
+METHODS = catalog("method")
 CONFIGURATIONS = [
     "spanning-tree",
     "spectral",
@@ -81,7 +81,7 @@ def test_no_method_is_deterministic_from_a_start_that_draws(start: str) -> None:
 
 
 def failed(plugin: Path, fault: str) -> set[str]:
-    info = registry.catalog("method", [plugin])["faulty"]
+    info = catalog("method", [plugin])["faulty"]
     return {f.check for f in check_method(info, {"fault": fault}) if f.result == "failed"}
 
 
@@ -96,7 +96,7 @@ def test_a_random_method_fails_the_metamorphic_checks(faulty_plugin: Path) -> No
 
 
 def test_a_crash_is_a_finding(faulty_plugin: Path) -> None:
-    info = registry.catalog("method", [faulty_plugin])["faulty"]
+    info = catalog("method", [faulty_plugin])["faulty"]
     finding = next(iter(check_method(info, {"fault": "segfault"})))
     assert finding.result == "failed"
     assert "SIGSEGV" in finding.detail

@@ -12,7 +12,8 @@ from bench.methods._lib.dmf import dmf_thin
 from bench.methods._lib.dmf.crdmf_dense import SymmetricFactorization
 from bench.methods.crdmf import CRDMF, agrees_with_tree, reweighted
 from bench.methods.spectral import Spectral
-from bench.plugins.registry import Source, catalog
+from bench.plugins.catalog import catalog
+from bench.plugins.declare import Source
 
 NOISY = random_edges(60, 0.5)
 GRAPHS = {

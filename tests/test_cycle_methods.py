@@ -19,7 +19,7 @@ from bench.methods.desc import DESC
 from bench.methods.l1_irls import L1IRLS
 from bench.methods.mpls import MPLS
 from bench.methods.spectral import Spectral
-from bench.plugins.registry import Source
+from bench.plugins.declare import Source
 from bench.scoring.metrics.roc import roc_auc
 
 ALL = 10**6

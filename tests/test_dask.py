@@ -273,9 +273,7 @@ import os, signal, time
 from dataclasses import dataclass
 import numpy as np
 import psutil
-from bench.core import so3
-from bench.core.problem import Instance, Problem
-from bench.plugins.registry import Source, dataset, method
+from bench import Instance, Problem, Source, dataset, method, so3
 
 
 @method("killer", title="Killer", deterministic=False)

@@ -18,7 +18,7 @@ from bench.datasets._simulated.statistics import hardness
 from bench.datasets.erdos_renyi import ErdosRenyi
 from bench.datasets.one_dsfm import FETCH, SCENES, OneDSfM
 from bench.datasets.pose_graph import PoseGraph, propagated
-from bench.plugins.registry import Missing, Source
+from bench.plugins.declare import Missing, Source
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

@@ -8,7 +8,7 @@ import pytest
 from test_conformance import CONFIGURATIONS
 
 from bench.execution.supervise import Limits
-from bench.plugins import registry
+from bench.plugins.catalog import catalog
 from bench.plugins.selection import format_selection
 from bench.running.conformance import check_method
 from bench.running.engines.local import LocalEngine
@@ -69,7 +69,7 @@ def test_liars_are_found(liar: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("lie", LIES)
 def test_check_finds_them_too(liar: Path, lie: str) -> None:
-    info = registry.catalog("method", [liar])["liar"]
+    info = catalog("method", [liar])["liar"]
     findings = {f.check: f for f in check_method(info, {"lie": lie})}
     assert findings["deterministic as declared"].result == "failed"
     assert {f.check for f in check_method(info, {}) if f.result == "failed"} == set()
@@ -97,8 +97,7 @@ LIAR = '''
 import os, time
 from dataclasses import dataclass
 import numpy as np
-from bench.core import so3
-from bench.plugins.registry import method
+from bench import method, so3
 
 
 @method("liar", title="Liar", exact_to_deg=1e-3)

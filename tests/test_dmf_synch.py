@@ -14,7 +14,8 @@ from bench.methods._lib.dmf import dmf_thin
 from bench.methods._lib.dmf.dmf_dense import DenseFactorization
 from bench.methods.dmf_synch import DMFSynch
 from bench.methods.spectral import Spectral
-from bench.plugins.registry import Source, catalog
+from bench.plugins.catalog import catalog
+from bench.plugins.declare import Source
 
 NOISY = random_edges(60, 0.5)
 RING = np.array([[k, k + 1] for k in range(29)] + [[0, 29]], dtype=np.int32)

@@ -12,13 +12,13 @@ from bench.core.problem import Problem
 from bench.execution import launch
 from bench.execution.single import Answer, SingleSolver
 from bench.execution.supervise import Limits
-from bench.plugins import registry
+from bench.plugins.catalog import catalog
 
 LIMITS = Limits(seconds=30, memory_gib=1.0)
 
 
 def solve(plugin: Path, fault: str, limits: Limits = LIMITS, mark: str = "", seed: int = 0) -> Answer:
-    info = registry.catalog("method", [plugin])["faulty"]
+    info = catalog("method", [plugin])["faulty"]
     problem = Problem(3, np.array([(0, 1), (0, 2), (1, 2)]), np.tile(np.eye(3), (3, 1, 1)))
     with SingleSolver(info, {"fault": fault, "mark": mark}, limits) as solver:
         return solver.solve(problem, seed)
@@ -107,7 +107,7 @@ def test_without_fork_a_fresh_interpreter_does_the_same(faulty_plugin: Path, mon
 
 
 def test_a_server_that_dies_is_replaced(faulty_plugin: Path) -> None:
-    info = registry.catalog("method", [faulty_plugin])["faulty"]
+    info = catalog("method", [faulty_plugin])["faulty"]
     problem = Problem(2, np.array([(0, 1)]), np.eye(3)[None])
     with SingleSolver(info, {}, LIMITS) as solver:
         assert solver.solve(problem)[0].text == "ok"
@@ -118,7 +118,7 @@ def test_a_server_that_dies_is_replaced(faulty_plugin: Path) -> None:
 
 
 def test_a_disconnected_graph_is_solved_on_its_largest_component(faulty_plugin: Path) -> None:
-    info = registry.catalog("method", [faulty_plugin])["faulty"]
+    info = catalog("method", [faulty_plugin])["faulty"]
     problem = Problem(5, np.array([(0, 1), (2, 3), (2, 4)]), np.tile(np.eye(3), (3, 1, 1)))
     with SingleSolver(info, {}, LIMITS) as solver:
         _, report, estimate = solver.solve(problem)

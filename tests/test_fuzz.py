@@ -19,7 +19,7 @@ from bench.core.errors import InputError
 from bench.formats import read_graph
 from bench.formats.npz import read_topology
 from bench.papers.layout import load_layout
-from bench.plugins.registry import catalog
+from bench.plugins.catalog import catalog
 from bench.suite.experiment import load_suite
 
 

@@ -14,7 +14,7 @@ from bench.methods._lib.graph.hierarchical_tree import chordal_l1_mean, hierarch
 from bench.methods.hara import HARA
 from bench.methods.l1_irls import L1IRLS
 from bench.methods.spanning_tree import SpanningTree
-from bench.plugins.registry import Source
+from bench.plugins.declare import Source
 
 RNG = np.random.default_rng(0)  # the method draws nothing from it
 DENSE = random_edges(60, 0.4)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from bench.core.problem import Checkpoint, Estimate, Problem
 from bench.execution.output import ESTIMATE_FILE, RESULT_FILE, UnusableError, read_output
 from bench.execution.validate import MOST_TEXT, kept_warnings, scalars, what_is_wrong
-from bench.plugins.registry import catalog
+from bench.plugins.catalog import catalog
 from bench.running.run import Options, Run
 from bench.scoring.results import score
 
@@ -203,7 +203,7 @@ from dataclasses import dataclass
 from pathlib import Path
 import numpy as np
 from bench.core.problem import Estimate
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 class Unspeakable(Exception):
     def __str__(self):
@@ -336,7 +336,7 @@ def test_plug_ins_that_declare_nonsense_are_listed_as_broken(tmp_path: Path) -> 
     }
     for case, arguments in declared.items():
         (tmp_path / f"{case}.py").write_text(
-            "from dataclasses import dataclass\nfrom bench.plugins.registry import method\n"
+            "from dataclasses import dataclass\nfrom bench import method\n"
             f"@method({arguments})\n@dataclass(frozen=True)\nclass M:\n    def solve(self, problem, rng): ...\n"
         )
     (tmp_path / "leaves.py").write_text("import sys\nsys.exit('goodbye')\n")

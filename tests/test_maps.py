@@ -16,7 +16,7 @@ from bench.maps.axes import Axis, parse_axis, parse_cells
 from bench.maps.bounds import limits
 from bench.maps.criterion import Criterion, clairvoyant_median_deg, median_of_all, parse_criterion
 from bench.maps.drawing import draw, grid_of, successes
-from bench.plugins.registry import catalog
+from bench.plugins.catalog import catalog
 from bench.scoring.metrics.theory import cramer_rao_rms_deg
 
 SHAPE = (12, 12)
@@ -171,10 +171,7 @@ PLUGIN = '''
 """A method that breaks at a known line of a dataset that has one."""
 from dataclasses import dataclass
 import numpy as np
-from bench.core import so3
-from bench.core.problem import Instance, Problem
-from bench.plugins.registry import Source, dataset, method
-from bench.core.seeds import stream
+from bench import Instance, Problem, Source, dataset, method, so3, stream
 
 
 @method("brittle", title="Brittle")

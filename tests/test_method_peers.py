@@ -14,7 +14,7 @@ from bench.methods._lib.linear.certificate import chordal_cost, smallest_eigenva
 from bench.methods.colmap import Colmap
 from bench.methods.sdp import SDP
 from bench.methods.shonan import Shonan
-from bench.plugins.registry import Source
+from bench.plugins.declare import Source
 
 Peer = SDP | Shonan | Colmap
 

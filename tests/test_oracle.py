@@ -16,7 +16,7 @@ WANDERER = '''
 from dataclasses import dataclass
 import numpy as np
 from bench.core.problem import Checkpoint, Estimate
-from bench.plugins.registry import method
+from bench.plugins.declare import method
 
 
 @method("wanderer", title="Wanderer")

@@ -18,7 +18,7 @@ from bench.papers.items.scenes import SceneTable
 from bench.papers.layout import load_layout, paper_names
 from bench.papers.published import methods_of, read_published
 from bench.papers.tables.paper import property_grid, render, scene_grid
-from bench.plugins.registry import catalog
+from bench.plugins.catalog import catalog
 from bench.scoring.results import Results
 
 LAYOUT = """

@@ -23,7 +23,7 @@ from bench.execution import launch, processes, supervise
 from bench.execution.output import LARGEST_RESULT, UnusableError, read_output
 from bench.execution.single import Answer, SingleSolver
 from bench.execution.supervise import Limits
-from bench.plugins import registry
+from bench.plugins.catalog import catalog
 from bench.storage.arrays import save_estimate
 
 PLUGIN = Path(__file__).with_name("chaos_plugin.py")
@@ -31,7 +31,7 @@ TRIANGLE = Problem(3, np.array([(0, 1), (0, 2), (1, 2)]), np.tile(np.eye(3), (3,
 
 
 def solver(fault: str, seconds: float = 30) -> SingleSolver:
-    info = registry.catalog("method", [PLUGIN])["chaos"]
+    info = catalog("method", [PLUGIN])["chaos"]
     return SingleSolver(info, {"fault": fault}, Limits(seconds, memory_gib=1.0))
 
 
@@ -115,7 +115,7 @@ def test_an_import_that_hangs_costs_its_own_row(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(launch, "IMPORT_LIMIT_S", 3)
     plugin = tmp_path / "plugin.py"
     plugin.write_text(PLUGIN.read_text().replace('title="Chaos"', 'title="Chaos", requires=("slow_library",)'))
-    with SingleSolver(registry.catalog("method", [plugin])["chaos"], {}, Limits(60, 1.0)) as alone:
+    with SingleSolver(catalog("method", [plugin])["chaos"], {}, Limits(60, 1.0)) as alone:
         ended, _, _ = alone.solve(TRIANGLE)
     assert ended.text == "crashed(the fork server took more than 3 s while importing what the method requires)"
 

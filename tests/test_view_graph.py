@@ -9,7 +9,7 @@ from scenes import load, the_source
 from bench.core.errors import InputError
 from bench.datasets.one_dsfm import OneDSfM
 from bench.datasets.view_graph import ViewGraph
-from bench.plugins.registry import Missing, Source
+from bench.plugins.declare import Missing, Source
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

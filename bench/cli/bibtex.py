@@ -10,7 +10,7 @@ from bench.cli.options import RunFolder, run_folder
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bench.plugins.registry import Info
+    from bench.plugins.declare import Info
     from bench.suite.plan import Job
 
 
@@ -31,7 +31,8 @@ def bibtex(run: RunFolder) -> None:
 
 def _used(jobs: "list[Job]") -> "Iterator[Info]":
     """Methods and datasets of the jobs, in their order; what is no longer there is said on standard error."""
-    from bench.plugins import registry, selection
+    from bench.plugins import selection
+    from bench.plugins.catalog import catalog
 
     plugins = [path for path in dict.fromkeys(job.origin for job in jobs) if Path(path).is_file()]
     names = {
@@ -39,7 +40,7 @@ def _used(jobs: "list[Job]") -> "Iterator[Info]":
         "method": dict.fromkeys(job.method for job in jobs),
     }
     for kind, wanted in names.items():
-        known = registry.catalog(kind, plugins).entries
+        known = catalog(kind, plugins).entries
         for name in wanted:
             if name in known:
                 yield known[name]

@@ -15,10 +15,10 @@ def check(
 ) -> None:
     """Run the conformance checks on a method; exit code 1 when one fails."""
     from bench.core.errors import InputError
-    from bench.plugins import registry
+    from bench.plugins.catalog import catalog
     from bench.running.conformance import check_method
 
-    chosen = registry.catalog(kind.value, plugin or []).select([selection])
+    chosen = catalog(kind.value, plugin or []).select([selection])
     if len(chosen) != 1:
         raise InputError(f"check takes one method at a time, and '{selection}' stands for {len(chosen)}")
     failed = 0

@@ -8,7 +8,7 @@ import typer
 from bench.cli.options import DataDirOption, Protocol, ProtocolOption
 
 if TYPE_CHECKING:
-    from bench.plugins.registry import Missing, Source
+    from bench.plugins.declare import Missing, Source
 
 app = typer.Typer(help="List, fetch, verify and inspect data.", no_args_is_help=True)
 
@@ -18,7 +18,7 @@ Name = Annotated[str, typer.Argument(metavar="DATASET", help="A selection, such 
 @app.command("list")
 def list_(name: Name = "1dsfm", data_dir: DataDirOption = None, protocol: ProtocolOption = None) -> None:
     """List the instances of a dataset, on disk or not, with the command that gets what is missing."""
-    from bench.plugins.registry import Missing
+    from bench.plugins.declare import Missing
 
     for source in _sources(name, data_dir, protocol):
         if isinstance(source, Missing):
@@ -32,7 +32,7 @@ def inspect(name: Name, data_dir: DataDirOption = None, protocol: ProtocolOption
     """Load the instances of a dataset and print what is known of them."""
     import numpy as np
 
-    from bench.plugins.registry import Missing
+    from bench.plugins.declare import Missing
 
     for source in _sources(name, data_dir, protocol):
         if isinstance(source, Missing):
@@ -81,10 +81,10 @@ def verify(name: Annotated[str, typer.Argument(metavar="DATASET")], data_dir: Da
 
 
 def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> "list[Source | Missing]":
-    from bench.plugins import registry
+    from bench.plugins.catalog import catalog
 
     found = []
-    for info, parameters in registry.catalog("dataset").select([name]):
+    for info, parameters in catalog("dataset").select([name]):
         if protocol is not None and "protocol" in info.defaults():
             parameters |= {"protocol": protocol.value}
         found += list(info.configure(parameters).sources(data_dir, 0))
@@ -93,9 +93,9 @@ def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> "li
 
 def _fetchable(name: str) -> Any:
     from bench.core.errors import InputError
-    from bench.plugins import registry
+    from bench.plugins.catalog import catalog
 
-    info = registry.catalog("dataset")[name]
+    info = catalog("dataset")[name]
     if not info.facts["fetchable"]:
         raise InputError(f"dataset '{name}' is made on this machine; there is nothing to fetch")
     return info.configure({})

@@ -48,9 +48,10 @@ def _list_papers() -> None:
 
 
 def _list_plugins(kind: str, plugins: list[Path]) -> None:
-    from bench.plugins import registry, selection
+    from bench.plugins import selection
+    from bench.plugins.catalog import catalog
 
-    found = registry.catalog(kind, plugins)
+    found = catalog(kind, plugins)
     for info in sorted(found, key=lambda info: info.name):
         state = f"   not installed: {info.install_hint}" if info.not_installed else ""
         typer.echo(f"{info.name:<15} {info.summary}{state}")

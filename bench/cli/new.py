@@ -20,9 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Estimate, Problem
-from bench.plugins.registry import method
+from bench import Estimate, Problem, method, so3
 
 
 @method("{name}", title="{title}")

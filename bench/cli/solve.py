@@ -23,10 +23,10 @@ def solve(
     from bench.execution.single import SingleSolver
     from bench.execution.supervise import Limits
     from bench.formats import read_graph, rotations_writer
-    from bench.plugins import registry
+    from bench.plugins.catalog import catalog
 
     write = rotations_writer(out)
-    chosen = registry.catalog("method", plugin or []).select([method])
+    chosen = catalog("method", plugin or []).select([method])
     if len(chosen) != 1:
         raise InputError(f"solve takes one method, and '{method}' stands for {len(chosen)}")
     loaded = read_graph(graph)

@@ -1,5 +1,8 @@
 """The one exception whose message is written for the user, and how that quotes what came from outside."""
 
+import difflib
+from collections.abc import Iterable
+
 
 class InputError(ValueError):
     """Something that the user gave cannot be used.
@@ -23,3 +26,12 @@ def described(error: BaseException, most: int = 300) -> str:
         text = "(its message cannot be written)"
     text = "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text[: most + 1])
     return f"{type(error).__name__}: {text if len(text) <= most else text[:most] + '…'}"
+
+
+def suggestion(name: str, candidates: Iterable[str]) -> str:
+    """``"; did you mean 'x'?"`` for the nearest candidate, or the list of all where none is near."""
+    names = sorted(candidate[:80] for candidate in candidates)[:100]
+    near = difflib.get_close_matches(name[:80], names, n=1, cutoff=0.5)
+    if near:
+        return f"; did you mean '{near[0]}'?"
+    return f"; there are: {', '.join(names)}" if names else ""

@@ -31,7 +31,8 @@ from bench.core.seeds import stream
 from bench.execution.output import DISK_FULL, ESTIMATE_FILE, RESULT_FILE
 from bench.execution.threads import pin_threads
 from bench.execution.validate import kept_warnings, scalars, what_is_wrong
-from bench.plugins import registry
+from bench.plugins.catalog import import_origin, infos
+from bench.plugins.declare import Info
 from bench.storage.arrays import load_problem, save_estimate
 
 MANY = 10  # times repeat_s; a solution that takes longer is timed as it is, the first time
@@ -78,15 +79,15 @@ class Request:
 class Prepared:
     """What a job needs besides what it is told: the plug-in, the configured method and the problem."""
 
-    info: registry.Info
+    info: Info
     method: Any
     problem: Problem
 
 
 def prepare(request: Request) -> Prepared:
     """Import the plug-in, configure the method and load the problem."""
-    module = registry.import_origin(request.origin)
-    info = next(info for info in registry.infos(module, "method") if info.name == request.method)
+    module = import_origin(request.origin)
+    info = next(info for info in infos(module, "method") if info.name == request.method)
     return Prepared(info, info.configure(request.parameters), _loaded(request.problem))
 
 

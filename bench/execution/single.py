@@ -15,7 +15,7 @@ from bench.execution.job import execute
 from bench.execution.launch import Launcher
 from bench.execution.output import ESTIMATE_FILE
 from bench.execution.supervise import Limits
-from bench.plugins.registry import Info
+from bench.plugins.declare import Info
 from bench.storage.arrays import load_estimate, save_problem
 
 Answer = tuple[Outcome, dict[str, Any], Estimate | None]

@@ -7,8 +7,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from bench.core.errors import InputError, shown
-from bench.plugins.registry import suggestion
+from bench.core.errors import InputError, shown, suggestion
 
 # A suite has a thousand bytes. The parser's time grows with the square of the parts of a dotted key.
 _MOST_BYTES = 2**18

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core.errors import InputError
-from bench.plugins.registry import Info, suggestion
+from bench.core.errors import InputError, suggestion
+from bench.plugins.declare import Info
 
 FEWEST_CELLS = 3
 DIGITS = 6  # significant ones of a value: enough for any axis, short enough for a name

@@ -14,8 +14,9 @@ from bench.maps.adaptive import Sample, Tally, every_sample, next_samples
 from bench.maps.axes import Axis
 from bench.maps.bounds import Drawn
 from bench.maps.criterion import Criterion, median_of_all
-from bench.plugins import registry, selection
-from bench.plugins.registry import Info
+from bench.plugins import selection
+from bench.plugins.catalog import catalog
+from bench.plugins.declare import Info
 from bench.running.run import Options, Run
 from bench.scoring.metrics.errors import camera_errors
 from bench.suite.experiment import Cell, Suite
@@ -239,7 +240,7 @@ def one_dataset(text: str, plugins: Sequence[Path]) -> tuple[Info, dict[str, Any
     InputError
         Where it stands for several, or for something unknown.
     """
-    chosen = registry.catalog("dataset", plugins).select([text])
+    chosen = catalog("dataset", plugins).select([text])
     if len(chosen) != 1:
         raise InputError(f"a map is of one dataset, and '{text}' stands for {len(chosen)}")
     return chosen[0]

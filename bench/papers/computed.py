@@ -6,7 +6,8 @@ from typing import Any
 
 from bench.core.errors import InputError
 from bench.core.problem import Instance
-from bench.plugins import registry, selection
+from bench.plugins import selection
+from bench.plugins.catalog import catalog
 from bench.scoring.results import Results
 from bench.suite.plan import Job
 
@@ -44,7 +45,7 @@ def one(kind: str, text: str) -> tuple[str, dict[str, Any]]:
     InputError
         Where it stands for several, or for something unknown.
     """
-    chosen = registry.catalog(kind).select([text])
+    chosen = catalog(kind).select([text])
     if len(chosen) != 1:
         raise InputError(f"a layout names one {kind} at a time, and '{text}' stands for {len(chosen)}")
     info, parameters = chosen[0]

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.core import outcome
-from bench.core.errors import InputError
+from bench.core.errors import InputError, suggestion
 from bench.papers.computed import extended, label, spelled
 from bench.papers.items.scenes import SceneTable
 from bench.papers.measure import CHOICES, Answer, Measure
 from bench.papers.published import SCENE, methods_of
 from bench.plugins import selection
-from bench.plugins.registry import suggestion
 from bench.storage.store import Store
 from bench.suite.experiment import Suite
 from bench.suite.plan import Job

@@ -10,14 +10,13 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from bench.core.errors import InputError, shown
+from bench.core.errors import InputError, shown, suggestion
 from bench.formats import toml_file
 from bench.papers.items.claims import Claims
 from bench.papers.items.curves import CurvePlot
 from bench.papers.items.properties import PropertyTable
 from bench.papers.items.scenes import SceneTable
 from bench.papers.items.speedup import Speedup
-from bench.plugins.registry import suggestion
 from bench.scoring.metrics.alignment import RULES
 
 Item = SceneTable | PropertyTable | CurvePlot | Claims | Speedup

@@ -7,8 +7,8 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from bench.core.errors import InputError
-from bench.plugins.registry import Info, suggestion
+from bench.core.errors import InputError, suggestion
+from bench.plugins.declare import Info
 
 FILE = "references.bib"
 BENCHMARK = "tejus2023"  # the paper that this benchmark starts from

@@ -83,7 +83,12 @@ def format_parameters(parameters: Mapping[str, object]) -> str:
 
 def format_selection(name: str, parameters: Mapping[str, object]) -> str:
     """``name[key=value,...]``, or the bare name where there are no parameters."""
-    return f"{name}[{format_parameters(parameters)}]" if parameters else name
+    return label(name, format_parameters(parameters))
+
+
+def label(method: str, parameters: str) -> str:
+    """``method[parameters]`` of a row, whose parameters `format_parameters` has written; the bare name without."""
+    return f"{method}[{parameters}]" if parameters else method
 
 
 def _literal(word: str) -> Value:

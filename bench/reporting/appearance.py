@@ -23,8 +23,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.core.errors import InputError
-from bench.plugins.registry import suggestion
+from bench.core.errors import InputError, suggestion
 
 if TYPE_CHECKING:
     import pandas as pd

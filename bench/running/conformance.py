@@ -14,8 +14,8 @@ from bench.core.errors import InputError
 from bench.core.problem import Floats, Problem, oriented
 from bench.execution.single import Answer, SingleSolver
 from bench.execution.supervise import Limits
+from bench.plugins.declare import Info
 from bench.plugins.references import cite_keys, references
-from bench.plugins.registry import Info
 
 LIMITS = Limits(seconds=60, memory_gib=4)
 CAMERAS = 12

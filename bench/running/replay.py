@@ -17,8 +17,8 @@ from bench.execution import child, provenance
 from bench.execution.output import ESTIMATE_FILE
 from bench.execution.single import Answer, SingleSolver
 from bench.execution.supervise import Limits
-from bench.plugins import registry
-from bench.plugins.registry import Info, Missing, Source
+from bench.plugins.catalog import catalog
+from bench.plugins.declare import Info, Missing, Source
 from bench.storage.arrays import load_estimate, save_problem
 from bench.storage.store import Store
 from bench.suite.experiment import instance_key
@@ -116,7 +116,7 @@ def prepare(path: Path, data_dir: Path | None = None, plugins: Sequence[Path] = 
         Where the file is not a record, or its method or data are not to be had.
     """
     job, record = _read(path)
-    methods = registry.catalog("method", plugins or _plugin_files(job.origin))
+    methods = catalog("method", plugins or _plugin_files(job.origin))
     method = methods[job.method]
     run = next((folder for folder in path.resolve().parents if (folder / "plans").is_dir()), None)
     store = Store.open(run) if run is not None else None
@@ -181,7 +181,7 @@ def _problem(
 
 def _source(job: Job, data_dir: Path | None, plugins: Sequence[Path]) -> tuple[Source, str]:
     """The instance as it is today, and its key."""
-    ((info, parameters),) = registry.catalog("dataset", plugins).select([job.dataset])
+    ((info, parameters),) = catalog("dataset", plugins).select([job.dataset])
     configured = info.configure(parameters)
     for found in configured.sources(data_dir, job.seed):
         if found.name == job.instance:

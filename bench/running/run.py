@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from bench.core import outcome
 from bench.core.errors import InputError
 from bench.execution.supervise import Limits
-from bench.plugins import registry
+from bench.plugins.catalog import catalog
 from bench.plugins.selection import format_selection
 from bench.running.engines.local import Finished, LocalEngine
 from bench.running.engines.timing import TimingEngine
@@ -200,8 +200,8 @@ def _resolved(
     if options.data_dir is not None and not options.data_dir.is_dir():
         raise InputError(f"--data-dir {options.data_dir}: there is no such folder")
     suite = named if isinstance(named, Suite) else experiment.load_suite(named or experiment.DEFAULT_SUITE)
-    known_methods = registry.catalog("method", options.plugins)
-    known_datasets = registry.catalog("dataset", options.plugins)
+    known_methods = catalog("method", options.plugins)
+    known_datasets = catalog("dataset", options.plugins)
     own = [str(Path(path).resolve()) for path in options.plugins]
     for origin in own:
         if origin in known_methods.broken:

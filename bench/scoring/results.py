@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.compute as pc
 
 from bench.core.problem import Floats
-from bench.plugins.selection import format_parameters, parse
+from bench.plugins.selection import format_parameters, label, parse
 from bench.scoring.cache import Scores, scores_of
 from bench.scoring.inference.seed_ties import MANY_SEEDS, tied_by_seed
 from bench.scoring.inference.statistics import tied
@@ -199,7 +199,7 @@ def _compare_times(frame: "pd.DataFrame", baseline: str) -> None:
     def place(row: Mapping[str, Any]) -> Place:
         return row["dataset"], row["instance"], row["protocol"]
 
-    named = [row for row in rows if f"{row['method']}[{row['params']}]".removesuffix("[]") == baseline]
+    named = [row for row in rows if label(row["method"], row["params"]) == baseline]
     of_seed = {(place(row), row["seed"]): row["round_s"] for row in named}
     of_any = {place(row): row["round_s"] for row in reversed(named)}  # a deterministic baseline has one seed
     ratios = []

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.core.errors import InputError, shown
+from bench.core.errors import InputError, shown, suggestion
 from bench.formats import toml_file
-from bench.plugins import registry, selection
-from bench.plugins.registry import Catalog, Info, Missing, Source, parameters_of
+from bench.plugins import selection
+from bench.plugins.catalog import Catalog
+from bench.plugins.configure import parameters_of
+from bench.plugins.declare import Info, Missing, Source
 from bench.storage.store import digest
 from bench.suite import budget
 from bench.suite.plan import Job
@@ -113,7 +115,7 @@ _FIELDS: dict[str, tuple[type, ...]] = {
 def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
     for key, value in content.items():
         if key not in _FIELDS:
-            raise InputError(f"{where}: unknown key {shown(key)}{registry.suggestion(key, _FIELDS)}")
+            raise InputError(f"{where}: unknown key {shown(key)}{suggestion(key, _FIELDS)}")
         if not isinstance(value, _FIELDS[key]) or isinstance(value, bool):
             raise InputError(f"{where}: '{key}' must be a {_FIELDS[key][0].__name__}, not {shown(value)}")
     for key in ("datasets", "methods"):
@@ -121,7 +123,7 @@ def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
             raise InputError(f"{where}: '{key}' must be a list of selections, such as {key} = ['name[parameter=1]']")
         content[key] = tuple(content[key])
     if "baseline" in content and content["baseline"] not in content["methods"]:
-        guess = registry.suggestion(content["baseline"], content["methods"])
+        guess = suggestion(content["baseline"], content["methods"])
         raise InputError(f"{where}: the baseline {shown(content['baseline'])} is not one of its methods{guess}")
     if "budget" in content:
         if clash := [key for key in ("timeout_s", "memory_gib") if key in content]:

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from bench.core import outcome
-from bench.core.errors import InputError, shown
+from bench.core.errors import InputError, shown, suggestion
 from bench.papers.computed import Computed, extended, label, spelled
 from bench.papers.published import SCENE, methods_of
 from bench.plugins import selection
-from bench.plugins.registry import suggestion
 from bench.scoring.inference.difference import LEVEL, Difference, holm, paired, unpaired
 from bench.scoring.metrics.oracle import ORACLE
 from bench.suite.experiment import Suite

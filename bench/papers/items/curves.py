@@ -9,7 +9,7 @@ import numpy as np
 from bench.core import outcome
 from bench.core.problem import Floats
 from bench.papers.computed import Computed, extended, label, one, spelled
-from bench.plugins.registry import catalog
+from bench.plugins.catalog import catalog
 from bench.scoring.inference.statistics import seed_half_width
 from bench.scoring.metrics.theory import cramer_rao_rms_deg
 from bench.suite.experiment import Suite

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bench.core.errors import InputError
+from bench.core.errors import InputError, suggestion
 from bench.papers.computed import one
-from bench.plugins import registry
+from bench.plugins.catalog import catalog
 from bench.suite.experiment import Suite
 
 if TYPE_CHECKING:
@@ -53,14 +53,14 @@ class PropertyTable:
         """
         import pandas as pd
 
-        methods = registry.catalog("method")
+        methods = catalog("method")
         rows = []
         for name in dict.fromkeys((*self.published, *self.declared)):
             text = self.declared.get(name, "")
             facts = methods[one("method", text)[0]].facts if text else {}
             for heading, fact in self.columns.items():
                 if facts and fact not in facts:
-                    raise InputError(f"methods declare no '{fact}'{registry.suggestion(fact, facts)}")
+                    raise InputError(f"methods declare no '{fact}'{suggestion(fact, facts)}")
                 declared, published = facts.get(fact), self.published.get(name, {}).get(fact)
                 agree = None if declared is None or published is None else declared == published
                 values = (name, text, heading, declared, published, agree)

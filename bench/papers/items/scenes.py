@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from bench.core import outcome
-from bench.core.errors import InputError
+from bench.core.errors import InputError, suggestion
 from bench.papers.computed import Computed, extended, one
 from bench.papers.published import FACTS, SCENE, methods_of
 from bench.plugins import selection
-from bench.plugins.registry import suggestion
 from bench.suite.experiment import Suite
 
 if TYPE_CHECKING:

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from bench.core.errors import InputError
-from bench.plugins.registry import suggestion
+from bench.core.errors import InputError, suggestion
 from bench.reporting.tables.rows import Ties
 
 FORMATS = ("console", "markdown", "csv", "latex")

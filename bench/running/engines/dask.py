@@ -38,8 +38,8 @@ from bench.execution import provenance
 from bench.execution.job import record_of
 from bench.execution.launch import Launcher
 from bench.execution.supervise import Interrupted, Limits
-from bench.plugins import registry
-from bench.plugins.registry import Info
+from bench.plugins.catalog import import_origin, infos
+from bench.plugins.declare import Info
 from bench.running.engines.folders import WorkFolders
 from bench.running.engines.local import Finished, run_job
 from bench.storage.store import Store
@@ -229,7 +229,7 @@ def _same_method(job: Job) -> Info:
     """The method of a job as this worker finds it, which must be the one that was planned."""
     try:
         with _importing:  # a worker may have several threads, and a module is there before all of it is
-            found = registry.infos(registry.import_origin(job.origin), "method")
+            found = infos(import_origin(job.origin), "method")
     except Exception as error:  # a plug-in may fail in any way
         raise InputError(f"the dask worker on {_host()} cannot import {job.origin}: {error}") from error
     method = next((info for info in found if info.name == job.method), None)

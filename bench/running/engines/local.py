@@ -14,7 +14,7 @@ from bench.execution.job import execute, record_of
 from bench.execution.launch import Launcher
 from bench.execution.output import ESTIMATE_FILE
 from bench.execution.supervise import Interrupted, Limits
-from bench.plugins.registry import Info
+from bench.plugins.declare import Info
 from bench.running.engines.folders import WorkFolders
 from bench.storage.store import Store
 from bench.suite.experiment import Cell

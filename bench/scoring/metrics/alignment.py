@@ -9,9 +9,8 @@ the estimate or of the truth leaves the errors as they are.
 import numpy as np
 
 from bench.core import so3
-from bench.core.errors import InputError
+from bench.core.errors import InputError, suggestion
 from bench.core.problem import Floats
-from bench.plugins.registry import suggestion
 
 ANCHORS = 32
 ANCHOR_ITERATIONS = 20

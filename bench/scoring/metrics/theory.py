@@ -9,9 +9,8 @@ estimator that must find out which these are knows less, so that the bound holds
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core.errors import InputError
+from bench.core.errors import InputError, suggestion
 from bench.core.problem import Floats, Problem
-from bench.plugins.registry import suggestion
 
 NOISES = ("tangent", "langevin")
 MOST_TANGENT_DEG = 30.0

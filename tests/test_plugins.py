@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from bench.core.errors import InputError
-from bench.plugins import registry
+from bench.plugins.catalog import catalog
 
-HEADER = "from dataclasses import dataclass\nfrom typing import Literal\nfrom bench.plugins.registry import method\n"
+HEADER = "from dataclasses import dataclass\nfrom typing import Literal\nfrom bench import method\n"
 
 
 def write(path: Path, name: str, body: str = "", requires: str = "()") -> Path:
@@ -22,7 +22,7 @@ def write(path: Path, name: str, body: str = "", requires: str = "()") -> Path:
 
 
 def test_a_plugin_file_is_found_and_configured(tmp_path: Path) -> None:
-    info = registry.catalog("method", [write(tmp_path / "mine.py", "mine")])["mine"]
+    info = catalog("method", [write(tmp_path / "mine.py", "mine")])["mine"]
     assert info.summary == "Does nothing."
     assert info.defaults() == {"depth": 2, "rate": 0.5, "loss": "l1", "width": None}
     assert info.configure({"rate": 1, "width": 3}).rate == 1.0
@@ -39,14 +39,14 @@ def test_a_plugin_file_is_found_and_configured(tmp_path: Path) -> None:
     ],
 )
 def test_bad_parameters_are_one_sentence(tmp_path: Path, parameters: dict[str, object], sentence: str) -> None:
-    info = registry.catalog("method", [write(tmp_path / "mine.py", "mine")])["mine"]
+    info = catalog("method", [write(tmp_path / "mine.py", "mine")])["mine"]
     with pytest.raises(InputError, match=sentence):
         info.configure(parameters)
 
 
 def test_a_range_check_of_the_plugin_reaches_the_user(tmp_path: Path) -> None:
     body = "    def __post_init__(self):\n        if self.depth < 1: raise ValueError('depth must be at least 1')"
-    info = registry.catalog("method", [write(tmp_path / "mine.py", "mine", body)])["mine"]
+    info = catalog("method", [write(tmp_path / "mine.py", "mine", body)])["mine"]
     with pytest.raises(InputError, match="method 'mine': depth must be at least 1"):
         info.configure({"depth": 0})
 
@@ -55,7 +55,7 @@ def test_a_range_check_of_the_plugin_reaches_the_user(tmp_path: Path) -> None:
 def test_a_broken_plugin_is_listed_with_its_reason(tmp_path: Path, broken: str) -> None:
     path = tmp_path / "broken_one.py"
     path.write_text(broken)
-    found = registry.catalog("method", [path])
+    found = catalog("method", [path])
     assert list(found.broken) == [str(path)]
     with pytest.raises(InputError, match="method 'broken-one' is broken"):
         found["broken-one"]
@@ -64,16 +64,16 @@ def test_a_broken_plugin_is_listed_with_its_reason(tmp_path: Path, broken: str) 
 def test_two_plugins_of_one_name_are_an_error(tmp_path: Path) -> None:
     paths = [write(tmp_path / f"{k}.py", "mine") for k in "ab"]
     with pytest.raises(InputError, match="two methods are called 'mine'"):
-        registry.catalog("method", paths)
+        catalog("method", paths)
 
 
 def test_unknown_names_get_the_nearest(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no method 'spectrall'; did you mean 'spectral'"):
-        registry.catalog("method")["spectrall"]
+        catalog("method")["spectrall"]
 
 
 def test_missing_packages_are_seen_without_importing(tmp_path: Path) -> None:
-    info = registry.catalog("method", [write(tmp_path / "mine.py", "mine", requires="('numpy', 'not_there')")])["mine"]
+    info = catalog("method", [write(tmp_path / "mine.py", "mine", requires="('numpy', 'not_there')")])["mine"]
     assert info.not_installed == ("not_there",)
     assert info.install_hint == "python -m pip install not_there"
 
@@ -92,30 +92,30 @@ def test_missing_packages_are_seen_without_importing(tmp_path: Path) -> None:
 def test_a_wrong_declaration_says_what_to_do(tmp_path: Path, declaration: str, reason: str) -> None:
     path = tmp_path / "wrong.py"
     path.write_text(f"{HEADER}\n@method('wrong', title='T')\n{declaration}\n")
-    assert reason in registry.catalog("method", [path]).broken[str(path)]
+    assert reason in catalog("method", [path]).broken[str(path)]
 
 
 def test_a_grid_gives_each_configuration_once(tmp_path: Path) -> None:
-    found = registry.catalog("method", [write(tmp_path / "mine.py", "mine")])
+    found = catalog("method", [write(tmp_path / "mine.py", "mine")])
     chosen = found.select(["mine[depth=[2,3]]", "mine", "mine[depth=3,loss=l1]"])
     assert [parameters for _, parameters in chosen] == [{"depth": 2}, {"depth": 3}]
 
 
 def test_source_hash_follows_the_siblings_that_a_module_uses() -> None:
-    found = registry.catalog("method")
+    found = catalog("method")
     hashes = {info.name: info.source_hash for info in found}
     assert len(set(hashes.values())) == len(hashes)
 
 
 def test_every_built_in_plugin_imports() -> None:
     for kind in ("method", "dataset"):
-        assert registry.catalog(kind).broken == {}
+        assert catalog(kind).broken == {}
 
 
 def test_listing_imports_nothing_heavy() -> None:
     heavy = ("scipy", "torch", "gtsam", "cvxpy", "pycolmap", "numba", "pandas", "matplotlib", "pooch")
     code = (
-        "import sys; from bench.plugins import registry; [registry.catalog(k) for k in ('method', 'dataset')]; "
+        "import sys; from bench import catalog; [catalog(k) for k in ('method', 'dataset')]; "
         f"print([m for m in {heavy!r} if m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

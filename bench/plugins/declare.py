@@ -1,0 +1,205 @@
+"""How a method or a dataset is declared: a frozen dataclass with a decorator, whose fields are its parameters."""
+
+import dataclasses
+import importlib.util
+import re
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from bench.core.problem import Estimate, Floats, Instance, Problem
+from bench.plugins.configure import configured, default_of
+from bench.plugins.source_hash import hash_of_module
+
+INFO = "__rotsync_info__"
+_NAME = re.compile(r"[^\s\[\],='\"]+")
+
+T = TypeVar("T", bound=type)
+
+
+class Method(Protocol):
+    """A configured method."""
+
+    def solve(self, problem: Problem, rng: np.random.Generator) -> Floats | Estimate:
+        """Absolute rotations (n, 3, 3) of a connected problem, NaN where a camera is not solved."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """An instance that has not been loaded.
+
+    Parameters
+    ----------
+    name
+        Name of the instance within its dataset.
+    revision
+        What determines its bytes: a hash of the files, or of the generator with its parameters and seed.
+    load
+        Makes the instance.
+    seeded
+        Whether it changes with the run's seed.
+    """
+
+    name: str
+    revision: str
+    load: Callable[[], Instance]
+    seeded: bool = False
+
+
+@dataclass(frozen=True)
+class Missing:
+    """An instance that is not on disk, with the command that gets it."""
+
+    name: str
+    command: str
+
+
+class Dataset(Protocol):
+    """A configured dataset."""
+
+    def sources(self, data_dir: Path | None, seed: int) -> Iterable[Source | Missing]:
+        """The instances, not loaded. `data_dir` is the folder the user named, if any."""
+
+
+@dataclass(frozen=True)
+class Info:
+    """What is known of a plug-in without running it."""
+
+    kind: str
+    name: str
+    title: str
+    cite: str
+    requires: tuple[str, ...]
+    cls: type
+    origin: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def summary(self) -> str:
+        """First line of the docstring."""
+        return (self.cls.__doc__ or "").strip().split("\n", 1)[0]
+
+    @property
+    def not_installed(self) -> tuple[str, ...]:
+        """Required packages that are missing, found without importing them."""
+        return tuple(name for name in self.requires if importlib.util.find_spec(name) is None)
+
+    @property
+    def install_hint(self) -> str:
+        """The command that installs what is missing."""
+        return self.facts.get("install") or f"python -m pip install {' '.join(self.not_installed)}"
+
+    @property
+    def source_hash(self) -> str:
+        """Hash of the plug-in's file and of the sibling modules it imports."""
+        module = sys.modules[self.cls.__module__]
+        return hash_of_module(module)
+
+    def fact(self, name: str, configured: Any) -> Any:
+        """A fact of a configured object: its attribute of that name, or what the plug-in declares."""
+        return getattr(configured, name, self.facts[name])
+
+    def defaults(self) -> dict[str, Any]:
+        """Parameters with their default values."""
+        return {f.name: default_of(f) for f in dataclasses.fields(self.cls)}
+
+    def configure(self, parameters: Mapping[str, Any]) -> Any:
+        """Make the configured object.
+
+        Raises
+        ------
+        InputError
+            On an unknown parameter or a value of the wrong type or range.
+        """
+        return configured(self.cls, parameters, f"{self.kind} '{self.name}'")
+
+
+def method(
+    name: str,
+    *,
+    title: str,
+    cite: str = "",
+    requires: tuple[str, ...] = (),
+    install: str = "",
+    supervised: bool = False,
+    uses_images: bool = False,
+    robust: bool = False,
+    certifies: bool = False,
+    deterministic: bool = True,
+    max_cameras: int | None = None,
+    exact_to_deg: float = 1e-6,
+    invariant_to_deg: float | None = 1e-3,
+) -> Callable[[T], T]:
+    """Declare a frozen dataclass with a `solve` method as a method.
+
+    Parameters
+    ----------
+    name, title, cite
+        Its id, its name in tables, and the key of its paper in ``methods/references.bib``.
+    requires, install
+        Packages that `solve` imports, and the command that installs them where ``pip install`` of their names is not.
+    supervised, uses_images
+        The two columns of the founding paper's Table II.
+    robust, certifies
+        Whether it is meant to withstand outliers; whether it can prove optimality.
+    deterministic
+        Whether the same problem always gives the same estimate, whatever the seed.
+    max_cameras
+        The largest problem it is meant for; larger ones become ``skipped`` rows.
+    exact_to_deg
+        How closely it promises to recover small noise-free problems.
+    invariant_to_deg
+        How far relabelling cameras, permuting or reversing edges and turning frames may move its answer to a small
+        noisy problem; None promises nothing.
+
+    Where a fact depends on the parameters, an attribute of its name overrides what is declared (see `Info.fact`).
+    """
+    facts = {
+        "install": install,
+        "supervised": supervised,
+        "uses_images": uses_images,
+        "robust": robust,
+        "certifies": certifies,
+        "deterministic": deterministic,
+        "max_cameras": max_cameras,
+        "exact_to_deg": exact_to_deg,
+        "invariant_to_deg": invariant_to_deg,
+    }
+    return _declare("method", name, title, cite, requires, facts, "solve")
+
+
+def dataset(
+    name: str, *, title: str, cite: str = "", requires: tuple[str, ...] = (), fetchable: bool = False
+) -> Callable[[T], T]:
+    """Declare a frozen dataclass with a `sources` method as a dataset.
+
+    A `fetchable` dataset has ``fetch(folder)`` and ``verify(data_dir)`` as well.
+    """
+    return _declare("dataset", name, title, cite, requires, {"fetchable": fetchable}, "sources")
+
+
+def _declare(
+    kind: str, name: str, title: str, cite: str, requires: tuple[str, ...], facts: dict[str, Any], verb: str
+) -> Callable[[T], T]:
+    def register(cls: T) -> T:
+        if not isinstance(name, str) or not _NAME.fullmatch(name):
+            raise TypeError(f"{kind} {name!r}: its name must be one word without quotes and any of [ ] , =")
+        if not all(isinstance(text, str) for text in (title, cite)):
+            raise TypeError(f"{kind} '{name}': its title and cite must be text")
+        if not isinstance(requires, tuple) or not all(isinstance(r, str) and r.isidentifier() for r in requires):
+            raise TypeError(f"{kind} '{name}': requires must be a tuple of top-level packages, such as ('numpy',)")
+        if not dataclasses.is_dataclass(cls):
+            raise TypeError(f"{kind} '{name}': put @dataclass(frozen=True) below the @{kind} decorator")
+        if not callable(getattr(cls, verb, None)):
+            raise TypeError(f"{kind} '{name}' has no method called {verb}")
+        for f in dataclasses.fields(cls):
+            if default_of(f) is dataclasses.MISSING:
+                raise TypeError(f"{kind} '{name}': parameter '{f.name}' needs a default")
+        setattr(cls, INFO, Info(kind, name, title, cite, requires, cls, facts=facts))
+        return cls
+
+    return register
