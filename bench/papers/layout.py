@@ -79,7 +79,9 @@ def load_layout(name: str) -> Layout:
     """
     stem, content = toml_file.read("paper", PAPERS, name)
     beside = Path(name).parent if name.endswith(".toml") else None
-    folder, reference = (beside or resources.files(package) for package in ("bench.published", "bench.reference"))
+    folder, reference = (
+        beside or resources.files(package) for package in ("bench.results.published", "bench.results.reference")
+    )
     return _parsed(stem, f"layout {name}", content, folder, reference)
 
 

@@ -1,1 +1,0 @@
-"""Numbers that papers have printed; README.md says where each file comes from."""

@@ -1,1 +1,0 @@
-"""Our own runs that take long; README.md says what made each."""
