@@ -1,16 +1,16 @@
-"""Sentences of a paper as comparisons that can be tested, for several forms of its method."""
+"""What a layout says of a paper's sentences, and how each is tested."""
 
 import itertools
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from bench.core import outcome
 from bench.core.errors import InputError, shown, suggestion
-from bench.papers.computed import Computed, extended, label, spelled
-from bench.papers.published import SCENE, methods_of
+from bench.papers.computed import Computed, extended, label
+from bench.papers.item import Comparison, frame_of
+from bench.papers.published import SCENE, Sources, methods_of, read_published
 from bench.plugins import selection
 from bench.scoring.inference.difference import LEVEL, Difference, holm, paired, unpaired
 from bench.scoring.metrics.oracle import ORACLE
@@ -19,10 +19,14 @@ from bench.suite.experiment import Suite
 if TYPE_CHECKING:
     import pandas as pd
 
+    from bench.reporting.tables.grid import Grid
+
 HONEST = "honest"
+RULES = (HONEST, ORACLE)
 HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot tell"
 
 Errors = dict[tuple[str, int], float]  # by instance and seed
+Printed = list[dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,8 @@ class Claims:
     timeout_s: float = 3600.0
     memory_gib: float = 8.0
 
+    needs: ClassVar[Collection[str]] = (ORACLE,)
+
     def __post_init__(self) -> None:
         """Check the names of the forms."""
         for form in (form for statement in self.statements for form in statement.forms):
@@ -129,27 +135,20 @@ class Claims:
             for (dataset, seeds), chosen in methods.items()
         )
 
-    def compare(self, published: list[dict[str, str]], computed: Computed) -> "pd.DataFrame":
-        """Test every comparison, one row for each and for each rule that picks the iterate.
+    def compare(self, sources: Sources, computed: Computed) -> "Verdicts":
+        """Test every comparison under each rule that picks the iterate.
 
         Under the rule "honest" the estimate counts, under "oracle" its checkpoint with the smallest mean error; a
         method without checkpoints and a published number are the same under both. Comparisons on the same problems are
         paired by problem and seed (for published numbers: by scene), others are not. Of the p values those under one
         rule are corrected for their number.
 
-        Returns
-        -------
-        DataFrame
-            ``sentence, form, dataset, left, right, rule, pairs`` (0 where unpaired), ``left_deg, right_deg,
-            difference_deg, low_deg, high_deg, margin_deg, p_holds, p_fails, verdict``.
-
         Raises
         ------
         InputError
             Where a published column is not there.
         """
-        import pandas as pd
-
+        published = read_published(sources.published, self.published)
         columns = methods_of(published)
         rows = []
         for statement in self.statements:
@@ -159,16 +158,11 @@ class Claims:
                         f"{self.published} has no column '{side.published}'{suggestion(side.published, columns)}"
                     )
             for form, left, right, dataset in _comparisons(statement):
-                for rule in (HONEST, ORACLE):
+                for rule in RULES:
                     a, b = (self._errors(statement, form, s, dataset, rule, published, computed) for s in (left, right))
                     names = (self._name(form, left), self._name(form, right))
-                    rows.append(_row(statement, form, names, (left, right), dataset, rule, a, b))
-        frame = pd.DataFrame(rows)
-        for _, of_rule in frame.groupby("rule"):
-            for column in ("p_holds", "p_fails"):
-                frame.loc[of_rule.index, column] = holm(of_rule[column].tolist())
-        frame["verdict"] = np.select([frame["p_holds"] < LEVEL, frame["p_fails"] < LEVEL], [HOLDS, FAILS], default=OPEN)
-        return frame
+                    rows.append(_tested(statement, form, names, (left, right), dataset, rule, a, b))
+        return Verdicts(self, tuple(_judged(rows)), computed)
 
     def _method(self, form: str, side: Side) -> str:
         return side.method or extended(self.forms[form], side.parameters)
@@ -183,22 +177,60 @@ class Claims:
         side: Side,
         dataset: str,
         rule: str,
-        published: list[dict[str, str]],
+        published: Printed,
         computed: Computed,
     ) -> Errors:
         if side.published:
             printed = {row[SCENE].replace(" ", "_"): row[side.published] for row in published}
             return {(instance, 0): float(text) for instance, text in printed.items() if text}
-        if computed.results is None:
-            return {}
         place, method = label("dataset", extended(dataset, side.dataset)), label("method", self._method(form, side))
-        jobs = {job.id for job in computed.jobs if (job.dataset, spelled(job)) == (place, method)}
-        frame = computed.results.frame
-        own = frame[frame["job"].isin(jobs) & (frame["status"] == outcome.OK)]
-        by_oracle = own["stop_reason"] == ORACLE
-        chosen = own[by_oracle] if rule == ORACLE and by_oracle.any() else own[~by_oracle]
-        values = zip(chosen["instance"], chosen["seed"], chosen[statement.statistic], strict=True)
-        return {(instance, int(seed)): float(value) for instance, seed, value in values if np.isfinite(value)}
+        own = [s for s in computed.scores if s.ok and (s.dataset, s.method) == (place, method)]
+        by_oracle = [score for score in own if score.oracle]
+        chosen = by_oracle if rule == ORACLE and by_oracle else [score for score in own if not score.oracle]
+        values = {(s.instance, s.seed): float(getattr(s, statement.statistic)) for s in chosen}
+        return {key: value for key, value in values.items() if np.isfinite(value)}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One comparison under one rule; `pairs` is 0 where the two sides are not paired."""
+
+    sentence: str
+    form: str
+    dataset: str
+    left: str
+    right: str
+    rule: str
+    statistic: str
+    pairs: int
+    left_deg: float
+    right_deg: float
+    difference_deg: float
+    low_deg: float
+    high_deg: float
+    p_holds: float
+    p_fails: float
+    margin_deg: float
+    verdict: str = ""
+
+
+@dataclass(frozen=True)
+class Verdicts(Comparison):
+    """Every comparison, tested."""
+
+    table: Claims
+    rows: tuple[Verdict, ...]
+    computed: Computed
+
+    def frame(self) -> "pd.DataFrame":
+        """A row for each `Verdict`."""
+        return frame_of(self.rows)
+
+    def grid(self) -> "Grid":
+        """A row for each comparison: both sides and the verdict under each rule."""
+        from bench.papers.kinds.claims.grid import claims_grid
+
+        return claims_grid(self)
 
 
 def _comparisons(statement: Statement) -> Iterator[tuple[str, Side, Side, str]]:
@@ -208,7 +240,7 @@ def _comparisons(statement: Statement) -> Iterator[tuple[str, Side, Side, str]]:
             yield form, left, right, dataset
 
 
-def _row(
+def _tested(
     statement: Statement,
     form: str,
     names: tuple[str, str],
@@ -217,41 +249,48 @@ def _row(
     rule: str,
     left: Errors,
     right: Errors,
-) -> dict[str, Any]:
-    same_problems = sides[0].dataset == sides[1].dataset
-    if same_problems:
+) -> Verdict:
+    common: list[tuple[str, int]] = []
+    found: Difference
+    if sides[0].dataset == sides[1].dataset:
         common = sorted(left.keys() & right.keys())
         a, b = (np.array([side[key] for key in common]) for side in (left, right))
         found = paired(a, b, statement.margin_deg)
     else:
-        common = []
         a, b = (np.array(list(side.values())) for side in (left, right))
         found = unpaired(a, b, statement.margin_deg)
-    return {
-        "sentence": statement.sentence,
-        "form": form,
-        "dataset": dataset,
-        "left": _placed(names[0], sides[0]),
-        "right": _placed(names[1], sides[1]),
-        "rule": rule,
-        "statistic": statement.statistic,
-        "pairs": len(common),
-        "left_deg": float(a.mean()) if len(a) else np.nan,
-        "right_deg": float(b.mean()) if len(b) else np.nan,
-        **_columns(found),
-        "margin_deg": statement.margin_deg,
-    }
+    return Verdict(
+        statement.sentence,
+        form,
+        dataset,
+        _placed(names[0], sides[0]),
+        _placed(names[1], sides[1]),
+        rule,
+        statement.statistic,
+        len(common),
+        float(a.mean()) if len(a) else np.nan,
+        float(b.mean()) if len(b) else np.nan,
+        found.mean,
+        found.low,
+        found.high,
+        found.p_below,
+        found.p_above,
+        statement.margin_deg,
+    )
 
 
-def _columns(found: Difference) -> dict[str, float]:
-    return {
-        "difference_deg": found.mean,
-        "low_deg": found.low,
-        "high_deg": found.high,
-        "p_holds": found.p_below,
-        "p_fails": found.p_above,
-    }
+def _judged(rows: Sequence[Verdict]) -> Iterator[Verdict]:
+    """The comparisons with the p values under each rule corrected for their number, and what follows from them."""
+    corrected: dict[int, tuple[float, float]] = {}
+    for rule in RULES:
+        own = [k for k, row in enumerate(rows) if row.rule == rule]
+        below, above = holm([rows[k].p_holds for k in own]), holm([rows[k].p_fails for k in own])
+        corrected |= {k: (float(p), float(q)) for k, p, q in zip(own, below, above, strict=True)}
+    for k, row in enumerate(rows):
+        holds, fails = corrected[k]
+        verdict = HOLDS if holds < LEVEL else FAILS if fails < LEVEL else OPEN
+        yield replace(row, p_holds=holds, p_fails=fails, verdict=verdict)
 
 
 def _placed(name: str, side: Side) -> str:
-    return f"{name}, {selection.format_parameters(dict(side.dataset))}" if side.dataset else name
+    return f"{name}, {selection.format_parameters(side.dataset)}" if side.dataset else name
