@@ -9,8 +9,8 @@ import numpy as np
 
 from bench.core import outcome
 from bench.core.errors import InputError
-from bench.core.problem import Instance
-from bench.maps.adaptive import Sample, Tally, every_sample, next_samples
+from bench.core.problem import Floats, Instance
+from bench.maps.adaptive import Bools, Counts, Sample, Tally, every_sample, next_samples
 from bench.maps.axes import Axis
 from bench.maps.bounds import Drawn
 from bench.maps.criterion import Criterion, median_of_all
@@ -62,6 +62,27 @@ class _Sampled:
     median_deg: float
     success: bool
     answered: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """What a map knows of one method, all (nx, ny).
+
+    Parameters
+    ----------
+    samples, successes, failed
+        How many samples were taken, succeeded, and had no answer.
+    median_deg
+        Mean over the samples that have an answer; NaN where none has.
+    success
+        Whether more than half of the samples succeed, or in a cell without any, whether the nearest sampled cell does.
+    """
+
+    samples: Counts
+    successes: Counts
+    failed: Counts
+    median_deg: Floats
+    success: Bools
 
 
 class PhaseMap:
@@ -149,37 +170,31 @@ class PhaseMap:
                 self._count(method, sample)
         return True
 
-    def frame(self) -> "pd.DataFrame":
-        """The map, one row for each method and cell.
+    def layers(self) -> dict[str, Layers]:
+        """The map of each method."""
+        return {method: self._layers(method, tally) for method, tally in self.tallies.items()}
 
-        Returns
-        -------
-        DataFrame
-            ``method``, the two parameters, ``samples, successes, failed`` (without an answer), ``median_deg`` (mean
-            over the samples that have an answer) and ``success``: whether more than half of the samples succeed, or in
-            a cell without any, whether the nearest sampled cell does.
-        """
+    def _layers(self, method: str, tally: Tally) -> Layers:
+        answered, medians_deg = np.zeros(self.sweep.shape, np.intp), np.full(self.sweep.shape, np.nan)
+        for place, told in self._samples[method].items():
+            medians = [sampled.median_deg for sampled in told if sampled.answered]
+            answered[place] = len(medians)
+            medians_deg[place] = np.mean(medians) if medians else np.nan
+        return Layers(tally.tried, tally.hits, tally.tried - answered, medians_deg, tally.expected())
+
+    def frame(self) -> "pd.DataFrame":
+        """The map, one row for each method and cell: the two parameters, then the fields of `Layers`."""
         import pandas as pd
 
-        rows = []
-        for method, tally in self.tallies.items():
-            expected = tally.expected()
-            for x, y in np.ndindex(*self.sweep.shape):
-                told = self._samples[method].get((x, y), [])
-                medians = [sampled.median_deg for sampled in told if sampled.answered]
-                rows.append(
-                    {
-                        "method": method,
-                        self.sweep.x.parameter: self.sweep.x.values[x],
-                        self.sweep.y.parameter: self.sweep.y.values[y],
-                        "samples": len(told),
-                        "successes": int(tally.hits[x, y]),
-                        "failed": len(told) - len(medians),
-                        "median_deg": float(np.mean(medians)) if medians else np.nan,
-                        "success": bool(expected[x, y]),
-                    }
-                )
-        return pd.DataFrame(rows)
+        x, y = self.sweep.x, self.sweep.y
+        return pd.DataFrame(
+            [
+                {"method": method, x.parameter: x.values[i], y.parameter: y.values[j]}
+                | {name: values[i, j] for name, values in vars(own).items()}
+                for method, own in self.layers().items()
+                for i, j in np.ndindex(*self.sweep.shape)
+            ]
+        )
 
     def problems(self) -> Iterator[Drawn]:
         """Every cell's place, complete parameters and instances, made anew: most are never solved."""
