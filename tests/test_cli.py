@@ -14,6 +14,11 @@ import numpy as np
 import pytest
 from commands import bench
 
+from bench.api import run
+from bench.core.errors import InputError
+from bench.plugins.selection import format_parameters
+from bench.running.run import Options, Run
+
 COLUMNS = [
     "dataset",
     "instance",
@@ -202,6 +207,31 @@ def test_a_plugin_joins_the_suite_when_no_methods_are_named(faulty_plugin: Path,
     done = bench("run", "--plugin", faulty_plugin, "--out", tmp_path / "run", "--dry-run")
     assert "faulty" in done.stdout
     assert "l1-irls" in done.stdout
+
+
+def test_a_bare_method_is_its_default_and_a_bare_dataset_what_the_suite_has_of_it(tmp_path: Path) -> None:
+    def chosen(*methods: str) -> set[tuple[str, str]]:
+        jobs = [cell.job for cell in Run("quick", methods, ["erdos-renyi"], Options(out=tmp_path)).cells]
+        assert {job.instance for job in jobs} == {"n40-missing0.5", "n100-missing0.5", "n100-missing0.8"}
+        return {(job.method, format_parameters(job.parameters)) for job in jobs}
+
+    assert chosen("spectral") == {("spectral", "")}
+    assert chosen("spectral[normalised=false]", "shonan") == {("spectral", "normalised=false"), ("shonan", "")}
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"methods": "l1-irls"}, r"methods takes a list of selections, such as \['l1-irls'\], not 'l1-irls' alone"),
+        ({"datasets": "folded"}, "datasets takes a list"),
+        ({"seed": 3}, "run takes no 'seed'; did you mean 'seeds'?"),
+        ({"colour": "red"}, "run takes no 'colour'; there are: budget, data_dir"),
+    ],
+)
+def test_misuse_from_python_is_one_sentence(tmp_path: Path, given: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        run("quick", **{"out": tmp_path / "run"} | given)  # type: ignore[arg-type]
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_broken_plugin_is_listed_as_broken(tmp_path: Path) -> None:

@@ -25,11 +25,18 @@ def run(
     ] = None,
     method: Annotated[
         list[str] | None,
-        typer.Option("--method", "-m", metavar="M", help="Only these methods; repeat for more."),
+        typer.Option(
+            "--method",
+            "-m",
+            metavar="M",
+            help="In place of the suite's; a bare name is the default configuration. Repeats.",
+        ),
     ] = None,
     dataset: Annotated[
         list[str] | None,
-        typer.Option("--dataset", "-d", metavar="D", help="Only these datasets; repeat for more."),
+        typer.Option(
+            "--dataset", "-d", metavar="D", help="Only these; a bare name keeps the suite's selections of it. Repeats."
+        ),
     ] = None,
     out: Annotated[
         Path | None,

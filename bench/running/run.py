@@ -208,7 +208,7 @@ def _resolved(
             raise InputError(f"--plugin {origin} is broken: {known_methods.broken[origin]}")
     plugged_in = [info.name for info in known_methods if info.origin in own]
     changes: dict[str, Any] = {
-        "methods": experiment.narrowed(suite.methods, methods) if methods else (*suite.methods, *plugged_in),
+        "methods": tuple(methods) or (*suite.methods, *plugged_in),
         "seeds": options.seeds,
         "rounds": options.rounds,
         **_limits(options),
