@@ -10,7 +10,7 @@ from bench.cli.options import PluginOption
 
 def check(
     kind: Annotated[Kind, typer.Argument()],
-    selection: Annotated[str, typer.Argument(metavar="NAME", help="A selection, such as 'dmf-synch[depth=3]'.")],
+    selection: Annotated[str, typer.Argument(metavar="NAME", help="A selection, such as 'name[parameter=3]'.")],
     plugin: PluginOption = None,
 ) -> None:
     """Run the conformance checks on a method; exit code 1 when one fails."""

@@ -48,7 +48,7 @@ def compare(
     if not threshold >= 1:
         raise InputError(f"--threshold is a ratio of at least 1, such as 1.05, not {threshold:g}")
     stores = [Store.open(run_folder(run)) for run in (first, second)]
-    old, new = (score(store, align.value, protocol.value if protocol else None) for store in stores)
+    old, new = (score(store, align.value, protocol) for store in stores)
     found = compared(old, new, threshold, no_times=_why_no_times(stores, [old, new]))
     if format is CompareFormat.CSV:
         typer.echo(comparison_table(found).to_csv(index=False), nl=False)

@@ -8,10 +8,6 @@ import typer
 from bench.cli.options import Align, DataDirOption, PluginOption
 from bench.running.progress.live import execute
 
-EPILOG = (
-    "Example: python -m bench map -m l1-irls -m spectral "
-    "-d 'erdos-renyi[n=100,noise=langevin]' --x missing=0:0.9 --y outliers=0:0.9"
-)
 NAME = "map"
 
 
@@ -44,6 +40,8 @@ def map_(
     A coarse lattice first; then cells between neighbours that disagree, and further seeds where the outcome is
     unsure. What is stored is not solved again: after Ctrl-C, the same command continues. An `n` and a `noise_deg`
     make an axis as well as `missing` and `outliers`.
+
+    Example: -m l1-irls -d 'erdos-renyi[n=50]' --x missing=0:0.9 --y outliers=0:0.9
     """
     from bench.core.errors import InputError
     from bench.maps.make import read_sweep, write

@@ -16,13 +16,6 @@ class Align(StrEnum):
     ANCHORS = "anchors"
 
 
-class Protocol(StrEnum):
-    """Which cameras of a real scene are solved and scored."""
-
-    TRUTH_SUBGRAPH = "truth-subgraph"
-    COMPONENT = "component"
-
-
 class Rerun(StrEnum):
     """Which finished jobs are run again."""
 
@@ -50,7 +43,8 @@ class Format(StrEnum):
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or its name under results/runs.")]
 AlignOption = Annotated[Align, typer.Option("--align", help="Rule that removes the gauge; re-scores, runs nothing.")]
 ProtocolOption = Annotated[
-    Protocol | None, typer.Option("--protocol", help="Which cameras of a real scene are solved and scored.")
+    str | None,
+    typer.Option("--protocol", metavar="P", help="Which cameras are solved and scored, where data give the choice."),
 ]
 PluginOption = Annotated[
     list[Path] | None,

@@ -7,16 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench.cli.options import Align, AlignOption, DataDirOption, Engine, PluginOption, ProtocolOption, Rerun, wear
+from bench.core.program import program
 from bench.running.progress.live import execute, foreseen
 
 if TYPE_CHECKING:
     from bench.running.run import Run
-
-EPILOG = (
-    "Examples: python -m bench run | "
-    "python -m bench run --suite 1dsfm --data-dir DIR | "
-    "python -m bench run -m 'dmf-synch[depth=[2,3]]' -m l1-irls -d 'erdos-renyi[n=100,missing=0.8]' --seeds 10"
-)
 
 
 def run(
@@ -80,6 +75,10 @@ def run(
 
     With --timing, the jobs are timed instead: the table has median and least solve time and the ratio to the
     baseline of the suite (by default its first method).
+
+    Example: --suite 1dsfm --data-dir DIR
+
+    Example: -m 'dmf-synch[depth=[2,3]]' -m l1-irls -d 'folded[n=100]' --seeds 10
     """
     from bench.running.run import Options, Run
 
@@ -92,7 +91,7 @@ def run(
         timeout_s=timeout,
         memory_gib=memory,
         budget=budget,
-        protocol=protocol.value if protocol else None,
+        protocol=protocol,
         rerun=rerun.value,
         timing=timing,
         rounds=rounds,
@@ -156,4 +155,4 @@ def _present(planned: "Run", align: Align) -> None:
     typer.echo(f"plots:  {folder / 'plots'} (PNG, PDF, SVG)" if plots else "plots:  none, nothing was scored")
     report = write_report(planned.store, under_every_rule(planned.store, results), folder / FILE_NAME)
     typer.echo(f"report: {report} (one HTML file, no network)")
-    typer.echo(f"again:  python -m bench table {folder} --align chordal --format latex")
+    typer.echo(f"again:  {program()} table {folder} --align chordal --format latex")

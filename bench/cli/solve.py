@@ -10,7 +10,7 @@ from bench.cli.options import PluginOption
 
 def solve(
     graph: Annotated[Path, typer.Argument(help="1DSfM folder, EGs.txt, .g2o or .npz.")],
-    method: Annotated[str, typer.Option("--method", "-m", help="A selection, such as 'l1-irls'.")],
+    method: Annotated[str, typer.Option("--method", "-m", help="A selection, such as 'name[parameter=3]'.")],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help=".npz or .txt for the absolute rotations.")],
     seed: Annotated[int, typer.Option()] = 0,
     timeout: Annotated[float, typer.Option(metavar="SECONDS")] = 3600,

@@ -25,7 +25,7 @@ def table(
     from bench.storage.store import Store
 
     wear(style)
-    results = score(Store.open(run_folder(run)), align.value, protocol.value if protocol else None, oracle=oracle)
+    results = score(Store.open(run_folder(run)), align.value, protocol, oracle=oracle)
     width = shutil.get_terminal_size((100, 24)).columns
     text, footnotes = render_table(results, format.value, width=width, terminal=sys.stdout.isatty())
     typer.echo(text, nl=not text.endswith("\n"))

@@ -156,7 +156,7 @@ def resolve(
         for seed in range(suite.seeds):
             for source in configured.sources(data_dir, seed):
                 if isinstance(source, Missing):
-                    names = missing.setdefault((info.name, source.command), [])
+                    names = missing.setdefault((info.name, source.how(info.name)), [])
                     names += [source.name] if source.name not in names else []
                 elif source.seeded or seed == 0:
                     cells += _cells_of(source, info, configured, label, seed, suite.seeds, chosen, rounds)
