@@ -107,7 +107,7 @@ ERDOS_RENYI = catalog("dataset")["erdos-renyi"]
 
 def test_axes_are_read() -> None:
     assert parse_axis("missing=0:0.9", 4, ERDOS_RENYI) == Axis("missing", (0.0, 0.3, 0.6, 0.9))
-    assert parse_axis("n=10:1000:log", 3, ERDOS_RENYI) == Axis("n", (10, 100, 1000), logarithmic=True)
+    assert parse_axis("n=10:1000:log", 3, ERDOS_RENYI) == Axis("n", (10, 100, 1000))
     assert parse_axis("n=4:6", 12, ERDOS_RENYI).values == (4, 5, 6)
     assert (parse_cells("12"), parse_cells("16x8")) == ((12, 12), (16, 8))
 

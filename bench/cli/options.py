@@ -1,8 +1,10 @@
 """Options that several verbs share."""
 
+import shutil
+import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -73,6 +75,19 @@ def wear(given: Path | None = None, width: str | None = None) -> None:
     if width is not None:
         wanted = replace(wanted, width_in=width_in(width))
     put_in_force(wanted)
+
+
+def console() -> dict[str, Any]:
+    """Columns of the terminal, and whether there is one: what a table has to know of it."""
+    return {"width": shutil.get_terminal_size((100, 24)).columns, "terminal": sys.stdout.isatty()}
+
+
+def show(table: tuple[str, tuple[str, ...]]) -> None:
+    """Print a table on standard output, and the notes that are not in it on standard error."""
+    text, notes = table
+    typer.echo(text, nl=not text.endswith("\n"))
+    for note in notes:
+        typer.echo(note, err=True)
 
 
 def run_folder(given: Path) -> Path:

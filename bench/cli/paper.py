@@ -1,13 +1,11 @@
 """``bench paper``: a table or figure of a paper, made again and compared."""
 
-import shutil
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import Align, DataDirOption, Format, StyleOption, wear
+from bench.cli.options import Align, DataDirOption, Format, StyleOption, console, show, wear
 from bench.running.progress.live import execute
 
 if TYPE_CHECKING:
@@ -55,12 +53,12 @@ def paper(
     rule = align.value if align else None
     if not explain:
         made = make(layout, chosen, options, rule, _run)
-        _print(made, format)
+        show(made.text(format.value, **console()))
         _save(made, folder / "plots", item)
         return
     done = []
     for found in explanations(layout, chosen, explain, options, rule, _run):
-        _print(found, format)
+        show(found.text(format.value, **console()))
         done.append(found)
     for sentence in together(done):
         typer.echo(sentence, err=format is not Format.CONSOLE)
@@ -72,14 +70,6 @@ def _run(planned: "Run") -> None:
     typer.echo(f"{planned.experiment.suite.name}: {where}", err=True)
     planned.prepare(lambda text: typer.echo(text, err=True))
     execute(planned, stderr=True)
-
-
-def _print(made: "Comparison", format: Format) -> None:
-    width = shutil.get_terminal_size((120, 24)).columns
-    text, notes = made.text(format.value, width=width, terminal=sys.stdout.isatty())
-    typer.echo(text, nl=not text.endswith("\n"))
-    for note in notes:
-        typer.echo(note, err=True)
 
 
 def _save(made: "Comparison", folder: Path, name: str) -> None:

@@ -1,12 +1,21 @@
 """``bench run``: compare methods, then say where tables and plots are."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, DataDirOption, Engine, PluginOption, ProtocolOption, Rerun, wear
+from bench.cli.options import (
+    Align,
+    AlignOption,
+    DataDirOption,
+    Engine,
+    PluginOption,
+    ProtocolOption,
+    Rerun,
+    console,
+    wear,
+)
 from bench.core.program import program
 from bench.running.progress.live import execute, foreseen
 
@@ -136,8 +145,6 @@ def _list_cells(planned: "Run") -> None:
 
 
 def _present(planned: "Run", align: Align) -> None:
-    import shutil
-
     from bench.reporting.html.page import FILE_NAME, write_report
     from bench.reporting.html.realign import under_every_rule
     from bench.reporting.present import render_table, write_plots, write_tables
@@ -145,9 +152,7 @@ def _present(planned: "Run", align: Align) -> None:
 
     wear()
     results = score(planned.store, align.value, planned.options.protocol, checkpoints=True)
-    width = shutil.get_terminal_size((100, 24)).columns
-    text, _ = render_table(results, "console", width=width, terminal=sys.stdout.isatty())
-    typer.echo(f"\n{text}")
+    typer.echo(f"\n{render_table(results, 'console', **console())[0]}")
     folder = planned.store.folder
     write_tables(results, folder / "tables")
     plots = write_plots(results, folder / "plots")

@@ -19,20 +19,17 @@ def solve(
     plugin: PluginOption = None,
 ) -> None:
     """Solve one graph with one method and write the absolute rotations (world to camera)."""
-    from bench.core.errors import InputError
     from bench.execution.single import SingleSolver
     from bench.execution.supervise import Limits
     from bench.formats import read_graph, rotations_writer
     from bench.plugins.catalog import catalog
 
     write = rotations_writer(out)
-    chosen = catalog("method", plugin or []).select([method])
-    if len(chosen) != 1:
-        raise InputError(f"solve takes one method, and '{method}' stands for {len(chosen)}")
+    chosen = catalog("method", plugin or []).one(method)
     loaded = read_graph(graph)
     problem = loaded.problem
     typer.echo(f"{graph}: {problem.n} cameras, {problem.m} edges")
-    with SingleSolver(*chosen[0], Limits(timeout, memory), threads) as solver:
+    with SingleSolver(*chosen, Limits(timeout, memory), threads) as solver:
         ended, report, estimate = solver.solve(problem, seed)
     for note in (*loaded.notes, *report.get("notes", ())):
         typer.echo(f"note: {note}")

@@ -6,7 +6,8 @@ from pathlib import Path
 from bench.maps.axes import parse_axis, parse_cells
 from bench.maps.bounds import limits
 from bench.maps.criterion import parse_criterion
-from bench.maps.sweep import PhaseMap, Sweep, one_dataset
+from bench.maps.sweep import PhaseMap, Sweep
+from bench.plugins.catalog import catalog
 
 
 def read_sweep(
@@ -27,7 +28,7 @@ def read_sweep(
         Where one of them is of another form, or names something unknown.
     """
     count_x, count_y = parse_cells(cells)
-    info, _ = one_dataset(dataset, plugins)
+    info, _ = catalog("dataset", plugins).one(dataset)
     x, y = parse_axis(axes[0], count_x, info), parse_axis(axes[1], count_y, info)
     return Sweep(tuple(methods), dataset, x, y, seeds, parse_criterion(success), alignment)
 

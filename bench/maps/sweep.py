@@ -1,8 +1,7 @@
 """A phase map in the making: samples are ordinary jobs of an ordinary run, asked for round by round."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,6 +53,10 @@ class Sweep:
         """Cells along x and along y."""
         return len(self.x.values), len(self.y.values)
 
+    def varied(self, x: int, y: int) -> dict[str, Any]:
+        """The two parameters in a cell."""
+        return {self.x.parameter: self.x.values[x], self.y.parameter: self.y.values[y]}
+
 
 @dataclass(frozen=True)
 class _Sampled:
@@ -103,7 +106,7 @@ class PhaseMap:
 
     def __init__(self, sweep: Sweep, options: Options) -> None:
         self.sweep = sweep
-        self.dataset, given = one_dataset(sweep.dataset, options.plugins)
+        self.dataset, given = catalog("dataset", options.plugins).one(sweep.dataset)
         for axis in (sweep.x, sweep.y):
             if axis.parameter in given:
                 raise InputError(f"'{axis.parameter}' is an axis of the map; leave it out of '{sweep.dataset}'")
@@ -201,15 +204,12 @@ class PhaseMap:
         first = self.methods[0]
         for x, y in np.ndindex(*self.sweep.shape):
             sources = [self._cells[first, (x, y, seed)].source for seed in range(self.sweep.seeds)]
-            yield (x, y), self.parameters | self._varied(x, y), (source.load() for source in sources)
-
-    def _varied(self, x: int, y: int) -> dict[str, Any]:
-        return _varied(self.sweep, x, y)
+            yield (x, y), self.parameters | self.sweep.varied(x, y), (source.load() for source in sources)
 
     def _indexed(self, given: dict[str, Any]) -> dict[tuple[str, Sample], Cell]:
         """Every cell of the experiment by the method and the sample that it is."""
         places = {
-            selection.format_selection(self.dataset.name, given | self._varied(x, y)): (x, y)
+            selection.format_selection(self.dataset.name, given | self.sweep.varied(x, y)): (x, y)
             for x, y in np.ndindex(*self.sweep.shape)
         }
         found = {}
@@ -235,7 +235,7 @@ class PhaseMap:
                 raise InputError(f"dataset '{self.dataset.name}' has no truth to tell success by")
             errors = camera_errors(store.estimate(cell.job.id).rotations, instance.truth, self.sweep.alignment)
             median = median_of_all(errors[np.isfinite(instance.truth).all(axis=(1, 2))])
-            met = self.sweep.success.met(median, instance, self.parameters | self._varied(*sample[:2]))
+            met = self.sweep.success.met(median, instance, self.parameters | self.sweep.varied(*sample[:2]))
             told = _Sampled(median, met, True)
         self.tallies[method].add(sample, told.success)
         self._samples[method].setdefault(sample[:2], []).append(told)
@@ -247,27 +247,9 @@ class PhaseMap:
         return self._last[1]
 
 
-def one_dataset(text: str, plugins: Sequence[Path]) -> tuple[Info, dict[str, Any]]:
-    """A dataset and the parameters given, from a selection that stands for one configuration.
-
-    Raises
-    ------
-    InputError
-        Where it stands for several, or for something unknown.
-    """
-    chosen = catalog("dataset", plugins).select([text])
-    if len(chosen) != 1:
-        raise InputError(f"a map is of one dataset, and '{text}' stands for {len(chosen)}")
-    return chosen[0]
-
-
 def _suite(sweep: Sweep, dataset: Info, given: dict[str, Any]) -> Suite:
     cells = tuple(
-        selection.format_selection(dataset.name, given | _varied(sweep, x, y)) for x, y in np.ndindex(*sweep.shape)
+        selection.format_selection(dataset.name, given | sweep.varied(x, y)) for x, y in np.ndindex(*sweep.shape)
     )
     title = f"{sweep.x.parameter} x {sweep.y.parameter}"
     return Suite("map", title, cells, sweep.methods, sweep.seeds)
-
-
-def _varied(sweep: Sweep, x: int, y: int) -> dict[str, Any]:
-    return {sweep.x.parameter: sweep.x.values[x], sweep.y.parameter: sweep.y.values[y]}

@@ -1,7 +1,7 @@
 """What has been computed for an item of a paper."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -53,10 +53,7 @@ class Score:
         return self.status == outcome.OK
 
 
-NUMBERS = (
-    *("mean_deg", "median_deg", "rms_deg", "solve_s", "iterations"),
-    *("n_cameras", "n_scored", "edges_percent", "hardness"),
-)
+NUMBERS = [f.name for f in fields(Score) if f.type is float]
 
 
 @dataclass(frozen=True)
@@ -112,17 +109,8 @@ def scores_of(results: Results, jobs: Sequence[Job]) -> Iterator[Score]:
 
 
 def one(kind: str, text: str) -> tuple[str, dict[str, Any]]:
-    """Name and given parameters of a selection that stands for one configuration.
-
-    Raises
-    ------
-    InputError
-        Where it stands for several, or for something unknown.
-    """
-    chosen = catalog(kind).select([text])
-    if len(chosen) != 1:
-        raise InputError(f"a layout names one {kind} at a time, and '{text}' stands for {len(chosen)}")
-    info, parameters = chosen[0]
+    """Name and given parameters of a selection that stands for one configuration."""
+    info, parameters = catalog(kind).one(text)
     return info.name, parameters
 
 

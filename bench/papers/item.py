@@ -19,9 +19,13 @@ if TYPE_CHECKING:
 class Comparison(ABC):
     """An item made again: what is measured beside what is published."""
 
-    @abstractmethod
+    rows: Sequence[Any]  # instances of one dataclass
+
     def frame(self) -> "pd.DataFrame":
-        """Every number, unrounded."""
+        """Every number, unrounded: a row for each of the rows, a column for each of their fields."""
+        import pandas as pd
+
+        return pd.DataFrame([dataclasses.asdict(row) for row in self.rows])
 
     @abstractmethod
     def grid(self) -> "Grid":
@@ -36,16 +40,11 @@ class Comparison(ABC):
         return None
 
     def text(self, style: str, *, width: int = 100, terminal: bool = False) -> tuple[str, tuple[str, ...]]:
-        """The table as console, markdown, csv or latex text, and the notes that are not in it (for csv all)."""
-        from bench.reporting.tables.console import render_grid
-        from bench.reporting.tables.grid import markdown
-        from bench.reporting.tables.latex import latex
+        """The table in a format, and the notes that are not in it; see `bench.reporting.tables.text.text_of`."""
+        from bench.reporting.tables.text import text_of
 
-        if style == "csv":
-            return self.frame().to_csv(index=False), self.grid().notes
-        if style == "console":
-            return render_grid(self.grid(), width=width, terminal=terminal), ()
-        return markdown([self.grid()]) if style == "markdown" else latex([self.printed()]), ()
+        grid = self.printed() if style == "latex" else self.grid()
+        return text_of(grid, self.frame(), style, width=width, terminal=terminal)
 
 
 class Item(Protocol):
@@ -74,10 +73,3 @@ class Item(Protocol):
         InputError
             Where the layout and the published numbers do not fit together.
         """
-
-
-def frame_of(rows: Sequence[Any]) -> "pd.DataFrame":
-    """A frame with a column for each field of the rows, which are instances of one dataclass."""
-    import pandas as pd
-
-    return pd.DataFrame([dataclasses.asdict(row) for row in rows])

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.papers.explain.measure import CHOICES, Answer, Measure
-from bench.papers.item import Comparison, frame_of
+from bench.papers.item import Comparison
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from bench.reporting.tables.grid import Grid
 
 NOTICED_DEG = 1e-4  # a gap that shrinks by less has not been closed
@@ -85,10 +83,6 @@ class Explained(Comparison):
         """The switch that leaves the smallest gap; None where none gave a number."""
         reached = [row for row in self.rows if math.isfinite(row.gap_after)]
         return min(reached, key=lambda row: row.gap_after, default=None)
-
-    def frame(self) -> "pd.DataFrame":
-        """A row for each `Tried`."""
-        return frame_of(self.rows)
 
     def grid(self) -> "Grid":
         """A row for each switch, those that come closest first."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from bench.core.errors import InputError, suggestion
 from bench.papers.computed import Computed, one
-from bench.papers.item import Comparison, frame_of
+from bench.papers.item import Comparison
 from bench.papers.published import Sources
 from bench.plugins.catalog import catalog
 from bench.suite.experiment import Suite
@@ -87,8 +87,8 @@ class Properties(Comparison):
     rows: tuple[Property, ...]
 
     def frame(self) -> "pd.DataFrame":
-        """``name, method, property, declared, published, agree``, a row for each property."""
-        return frame_of(self.rows).astype(object)
+        """A row for each `Property`; None stays None."""
+        return super().frame().astype(object)
 
     def grid(self) -> "Grid":
         """A row for each method; declared and published side by side for each property."""

@@ -10,15 +10,13 @@ import numpy as np
 
 from bench.core.errors import InputError
 from bench.papers.computed import Computed, label
-from bench.papers.item import Comparison, frame_of
+from bench.papers.item import Comparison
 from bench.papers.published import Sources
 from bench.plugins import selection
 from bench.scoring.metrics.oracle import ORACLE
 from bench.suite.experiment import Suite
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from bench.reporting.tables.grid import Grid
 
 
@@ -137,10 +135,6 @@ class Ratio(Comparison):
     table: Speedup
     rows: tuple[Side, ...]
     computed: Computed
-
-    def frame(self) -> "pd.DataFrame":
-        """``method, iterations, iteration_s, total_s, mean_deg, median_deg, times_less``, a row for each of the two."""
-        return frame_of(self.rows)
 
     def grid(self) -> "Grid":
         """A row for each of the two."""

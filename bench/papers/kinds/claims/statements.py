@@ -3,22 +3,20 @@
 import itertools
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from bench.core.errors import InputError, shown, suggestion
 from bench.papers.computed import Computed, extended, label
-from bench.papers.item import Comparison, frame_of
+from bench.papers.item import Comparison
 from bench.papers.published import SCENE, Sources, methods_of, read_published
 from bench.plugins import selection
-from bench.scoring.inference.difference import LEVEL, Difference, holm, paired, unpaired
+from bench.scoring.inference.difference import LEVEL, holm, paired, unpaired
 from bench.scoring.metrics.oracle import ORACLE
 from bench.suite.experiment import Suite
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from bench.reporting.tables.grid import Grid
 
 HONEST = "honest"
@@ -26,7 +24,6 @@ RULES = (HONEST, ORACLE)
 HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot tell"
 
 Errors = dict[tuple[str, int], float]  # by instance and seed
-Printed = list[dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -123,13 +120,10 @@ class Claims:
     def suites(self, name: str) -> tuple[Suite, ...]:
         """What has to run: a suite for each dataset and number of seeds."""
         methods: dict[tuple[str, int], dict[str, None]] = {}
-        for statement in self.statements:
-            for form, left, right, dataset in _comparisons(statement):
-                for side in (left, right):
-                    if not side.published:
-                        place = extended(dataset, side.dataset), statement.seeds or self.seeds
-                        chosen = methods.setdefault(place, {})
-                        chosen[self._method(form, side)] = None
+        for case in self._cases():
+            for side in (side for side in (case.left, case.right) if not side.published):
+                place = extended(case.dataset, side.dataset), case.statement.seeds or self.seeds
+                methods.setdefault(place, {})[self._method(case.form, side)] = None
         return tuple(
             Suite(name, self.title, (dataset,), tuple(chosen), seeds, self.timeout_s, self.memory_gib)
             for (dataset, seeds), chosen in methods.items()
@@ -149,46 +143,78 @@ class Claims:
             Where a published column is not there.
         """
         published = read_published(sources.published, self.published)
-        columns = methods_of(published)
+        printed = {
+            column: {(row[SCENE].replace(" ", "_"), 0): float(row[column]) for row in published if row[column]}
+            for column in methods_of(published)
+        }
         rows = []
-        for statement in self.statements:
-            for side in (*statement.left, *statement.right):
-                if side.published and side.published not in columns:
-                    raise InputError(
-                        f"{self.published} has no column '{side.published}'{suggestion(side.published, columns)}"
-                    )
-            for form, left, right, dataset in _comparisons(statement):
-                for rule in RULES:
-                    a, b = (self._errors(statement, form, s, dataset, rule, published, computed) for s in (left, right))
-                    names = (self._name(form, left), self._name(form, right))
-                    rows.append(_tested(statement, form, names, (left, right), dataset, rule, a, b))
+        for case, rule in itertools.product(self._cases(), RULES):
+            left, right = (
+                self._printed(side, printed) if side.published else self._errors(case, side, rule, computed)
+                for side in (case.left, case.right)
+            )
+            rows.append(self._tested(case, rule, left, right))
         return Verdicts(self, tuple(_judged(rows)), computed)
+
+    def _cases(self) -> Iterator["_Case"]:
+        for of in self.statements:
+            for form, dataset, left, right in itertools.product(of.forms, of.datasets, of.left, of.right):
+                yield _Case(of, form, dataset, left, right)
 
     def _method(self, form: str, side: Side) -> str:
         return side.method or extended(self.forms[form], side.parameters)
 
     def _name(self, form: str, side: Side) -> str:
-        return f"{side.published} (published)" if side.published else label("method", self._method(form, side))
+        name = f"{side.published} (published)" if side.published else label("method", self._method(form, side))
+        return f"{name}, {selection.format_parameters(side.dataset)}" if side.dataset else name
 
-    def _errors(
-        self,
-        statement: Statement,
-        form: str,
-        side: Side,
-        dataset: str,
-        rule: str,
-        published: Printed,
-        computed: Computed,
-    ) -> Errors:
-        if side.published:
-            printed = {row[SCENE].replace(" ", "_"): row[side.published] for row in published}
-            return {(instance, 0): float(text) for instance, text in printed.items() if text}
-        place, method = label("dataset", extended(dataset, side.dataset)), label("method", self._method(form, side))
-        own = [s for s in computed.scores if s.ok and (s.dataset, s.method) == (place, method)]
+    def _printed(self, side: Side, printed: Mapping[str, Errors]) -> Errors:
+        if side.published not in printed:
+            guess = suggestion(side.published, printed)
+            raise InputError(f"{self.published} has no column '{side.published}'{guess}")
+        return printed[side.published]
+
+    def _errors(self, case: "_Case", side: Side, rule: str, computed: Computed) -> Errors:
+        place = label("dataset", extended(case.dataset, side.dataset)), label("method", self._method(case.form, side))
+        own = [score for score in computed.scores if score.ok and (score.dataset, score.method) == place]
         by_oracle = [score for score in own if score.oracle]
         chosen = by_oracle if rule == ORACLE and by_oracle else [score for score in own if not score.oracle]
-        values = {(s.instance, s.seed): float(getattr(s, statement.statistic)) for s in chosen}
+        values = {(s.instance, s.seed): float(getattr(s, case.statement.statistic)) for s in chosen}
         return {key: value for key, value in values.items() if np.isfinite(value)}
+
+    def _tested(self, case: "_Case", rule: str, left: Errors, right: Errors) -> "Verdict":
+        paired_by = sorted(left.keys() & right.keys()) if case.left.dataset == case.right.dataset else None
+        a, b = (np.array([side[key] for key in (side if paired_by is None else paired_by)]) for side in (left, right))
+        statement = case.statement
+        found = (unpaired if paired_by is None else paired)(a, b, statement.margin_deg)
+        return Verdict(
+            statement.sentence,
+            case.form,
+            case.dataset,
+            self._name(case.form, case.left),
+            self._name(case.form, case.right),
+            rule,
+            statement.statistic,
+            len(paired_by or ()),
+            float(a.mean()) if len(a) else np.nan,
+            float(b.mean()) if len(b) else np.nan,
+            found.mean,
+            found.low,
+            found.high,
+            found.p_below,
+            found.p_above,
+            statement.margin_deg,
+        )
+
+
+class _Case(NamedTuple):
+    """One comparison of a statement."""
+
+    statement: Statement
+    form: str
+    dataset: str
+    left: Side
+    right: Side
 
 
 @dataclass(frozen=True)
@@ -222,61 +248,11 @@ class Verdicts(Comparison):
     rows: tuple[Verdict, ...]
     computed: Computed
 
-    def frame(self) -> "pd.DataFrame":
-        """A row for each `Verdict`."""
-        return frame_of(self.rows)
-
     def grid(self) -> "Grid":
         """A row for each comparison: both sides and the verdict under each rule."""
         from bench.papers.kinds.claims.grid import claims_grid
 
         return claims_grid(self)
-
-
-def _comparisons(statement: Statement) -> Iterator[tuple[str, Side, Side, str]]:
-    """Form, left side, right side and dataset of each comparison."""
-    for form, dataset in itertools.product(statement.forms, statement.datasets):
-        for left, right in itertools.product(statement.left, statement.right):
-            yield form, left, right, dataset
-
-
-def _tested(
-    statement: Statement,
-    form: str,
-    names: tuple[str, str],
-    sides: tuple[Side, Side],
-    dataset: str,
-    rule: str,
-    left: Errors,
-    right: Errors,
-) -> Verdict:
-    common: list[tuple[str, int]] = []
-    found: Difference
-    if sides[0].dataset == sides[1].dataset:
-        common = sorted(left.keys() & right.keys())
-        a, b = (np.array([side[key] for key in common]) for side in (left, right))
-        found = paired(a, b, statement.margin_deg)
-    else:
-        a, b = (np.array(list(side.values())) for side in (left, right))
-        found = unpaired(a, b, statement.margin_deg)
-    return Verdict(
-        statement.sentence,
-        form,
-        dataset,
-        _placed(names[0], sides[0]),
-        _placed(names[1], sides[1]),
-        rule,
-        statement.statistic,
-        len(common),
-        float(a.mean()) if len(a) else np.nan,
-        float(b.mean()) if len(b) else np.nan,
-        found.mean,
-        found.low,
-        found.high,
-        found.p_below,
-        found.p_above,
-        statement.margin_deg,
-    )
 
 
 def _judged(rows: Sequence[Verdict]) -> Iterator[Verdict]:
@@ -290,7 +266,3 @@ def _judged(rows: Sequence[Verdict]) -> Iterator[Verdict]:
         holds, fails = corrected[k]
         verdict = HOLDS if holds < LEVEL else FAILS if fails < LEVEL else OPEN
         yield replace(row, p_holds=holds, p_fails=fails, verdict=verdict)
-
-
-def _placed(name: str, side: Side) -> str:
-    return f"{name}, {selection.format_parameters(side.dataset)}" if side.dataset else name

@@ -21,15 +21,15 @@ def draw(found: Curves) -> Figure:
     """Draw the points of a figure; the vertical axis is logarithmic."""
     plot = found.plot
     looks = _looks(plot)
-    low = float(np.nanmin([point.error_deg for point in found.points])) / 1.6
-    high = float(np.nanmax([point.error_deg + np.nan_to_num(point.half_width_deg) for point in found.points])) * 1.2
+    low = float(np.nanmin([point.error_deg for point in found.rows])) / 1.6
+    high = float(np.nanmax([point.error_deg + np.nan_to_num(point.half_width_deg) for point in found.rows])) * 1.2
     with styled():
         handles = [_line(look, width, [], []) for look, width in looks.values()]
         figure, axes = panels(len(plot.panel.values), 2.9, 2.7, handles)
         for ax, panel in zip(axes, plot.panel.values, strict=True):
             ax.set_title(plot.panel.label.format(panel), loc="left")
             for curve, (look, width) in looks.items():
-                own = [point for point in found.points if (point.panel, point.curve) == (panel, curve)]
+                own = [point for point in found.rows if (point.panel, point.curve) == (panel, curve)]
                 _curve(ax, own, look, width, low)
             ax.set_xlabel(plot.axis.label)
         axes[0].set(yscale="log", ylim=(low, high))

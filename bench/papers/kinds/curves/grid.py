@@ -12,7 +12,7 @@ def point_grid(found: Curves) -> Grid:
     """A row for each panel and place on the axis, a column for each curve."""
     plot = found.plot
     places: dict[tuple[float, float], dict[str, Point]] = {}
-    for point in found.points:
+    for point in found.rows:
         places.setdefault((point.panel, point.x), {})[point.curve] = point
     curves = [curve.label for curve in plot.curves]
     return Grid(
@@ -34,12 +34,12 @@ def _text(point: Point) -> str:
 
 def notes(found: Curves) -> Iterator[str]:
     """What the figures are means of, and what is noted of problems and methods."""
-    seeds = max(point.seeds for point in found.points)
+    seeds = max(point.seeds for point in found.rows)
     yield f"Means over {seeds} seeds with their 95 % t intervals." if seeds > 1 else "One seed."
     names = {job.dataset: job.instance for job in found.computed.jobs}
     said: dict[str, list[str]] = {}
-    for curve in dict.fromkeys(point.curve for point in found.points):
-        own = [point for point in found.points if point.curve == curve]
+    for curve in dict.fromkeys(point.curve for point in found.rows):
+        own = [point for point in found.rows if point.curve == curve]
         remarks = [note for point in own for note in found.computed.notes.get(names.get(point.dataset, ""), ())]
         if (share := min(point.scored_percent for point in own)) < 100:
             remarks.append(
@@ -48,5 +48,5 @@ def notes(found: Curves) -> Iterator[str]:
         for note in dict.fromkeys(remarks):
             said.setdefault(note, []).append(curve)
     yield from (f"{' and '.join(curves)}: {note}." for note, curves in said.items())
-    if any(point.ok < point.seeds for point in found.points):
+    if any(point.ok < point.seeds for point in found.rows):
         yield "(k/s): only k of s seeds ended well."

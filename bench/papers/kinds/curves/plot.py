@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.core.problem import Floats
 from bench.papers.computed import Computed, extended, label, one
-from bench.papers.item import Comparison, frame_of
+from bench.papers.item import Comparison
 from bench.papers.published import Sources
 from bench.plugins.catalog import catalog
 from bench.scoring.inference.statistics import seed_half_width
@@ -162,14 +162,14 @@ class Curves(Comparison):
     """The figure, computed."""
 
     plot: CurvePlot
-    points: tuple[Point, ...]
+    rows: tuple[Point, ...]
     computed: Computed
 
     def frame(self) -> "pd.DataFrame":
         """A row for each `Point`; the columns of the two parameters and of the statistic bear their names."""
         plot = self.plot
         names = {"panel": plot.panel.parameter, "x": plot.axis.parameter, "error_deg": plot.statistic}
-        return frame_of(self.points).rename(columns=names)
+        return super().frame().rename(columns=names)
 
     def grid(self) -> "Grid":
         """A row for each panel and place on the axis, a column for each curve."""

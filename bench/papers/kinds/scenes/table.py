@@ -9,7 +9,7 @@ import numpy as np
 from bench.core import outcome
 from bench.core.errors import InputError, suggestion
 from bench.papers.computed import Computed, Score, extended, label
-from bench.papers.item import Comparison, frame_of
+from bench.papers.item import Comparison
 from bench.papers.published import FACTS, SCENE, Sources, methods_of, read_published
 from bench.suite.experiment import Suite
 
@@ -189,7 +189,7 @@ class Scenes(Comparison):
 
     def frame(self) -> "pd.DataFrame":
         """A row for each `Measured`, with the ``difference``."""
-        frame = frame_of(self.rows)
+        frame = super().frame()
         frame.insert(list(frame.columns).index("published") + 1, "difference", [row.difference for row in self.rows])
         return frame
 
