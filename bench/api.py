@@ -1,8 +1,11 @@
 """The door for Python users: what the command line does, with objects in place of files."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from bench.core.errors import InputError, suggestion
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,7 +28,8 @@ def run(
     suite
         Named suite or TOML file; "quick" where nothing is named.
     methods, datasets
-        Selections, such as ``"dmf-synch[depth=[2,3]]"``, that replace the suite's or choose among them.
+        Lists of selections, such as ``["method[parameter=[2,3]]"]``, in place of the suite's. The bare name of a method
+        is its default configuration; that of a dataset stands for the suite's selections of it, where it has any.
     align
         "l1", "chordal", "karcher" or "anchors".
     options
@@ -44,6 +48,13 @@ def run(
     from bench.running.run import Options, Run
     from bench.scoring.results import score
 
+    for name, given in (("methods", methods), ("datasets", datasets)):
+        if isinstance(given, str):
+            raise InputError(f"{name} takes a list of selections, such as [{given!r}], not {given!r} alone")
+    known = [field.name for field in fields(Options)]
+    for name in options:
+        if name not in known:
+            raise InputError(f"run takes no '{name}'{suggestion(name, known)}")
     paths = {name: Path(options[name]) for name in ("out", "data_dir") if options.get(name) is not None}
     planned = Run(suite, methods, datasets, Options(**options | paths))
     planned.prepare()

@@ -22,7 +22,6 @@ Protocol = Literal["truth-subgraph", "component"]
 
 FILES = (EDGES, COMPONENT, IMAGES, BUNDLE)
 FOLDER = "1dsfm"
-FETCH = "python -m bench data fetch 1dsfm"
 
 OFFICIAL = Archive(
     url="http://landmark.cs.cornell.edu/projects/1dsfm/datasets.tar.gz",
@@ -86,7 +85,7 @@ class OneDSfM:
         if self.scene is not None and self.scene not in known:
             raise InputError(f"there is no scene '{self.scene}' in 1dsfm{suggestion(self.scene, known)}")
         for name in known if self.scene is None else [self.scene]:
-            yield self._source(found[name]) if name in found else Missing(name, FETCH)
+            yield self._source(found[name]) if name in found else Missing(name)
 
     def fetch(self, folder: Path | None = None, *, archive: Archive = OFFICIAL, progress: bool = True) -> Path:
         """Download the official archive into `folder`, by default the cache, and unpack what is needed of it.
@@ -124,7 +123,7 @@ class OneDSfM:
         """
         found = _scenes(data_dir)
         if not found:
-            raise InputError(f"no scene of 1dsfm is on disk; get them with {FETCH}")
+            raise InputError("no scene of 1dsfm is on disk; get them with: data fetch 1dsfm")
         wrong = {folder: damaged(folder, OFFICIAL) for folder in {path.parent for path in found.values()}}
         return [(name, _state(path, wrong[path.parent])) for name, path in sorted(found.items())]
 
@@ -191,7 +190,7 @@ def _truth_notes(scene: str, truth: Floats | None) -> tuple[str, ...]:
 def _state(folder: Path, wrong: dict[str, str]) -> str:
     for name, why in wrong.items():
         if name.startswith(f"{folder.name}/"):
-            return f"{why}; get it again with {FETCH}"
+            return f"{why}; get it again with: data fetch 1dsfm"
     try:
         _load(folder, "component", "")
     except InputError as error:

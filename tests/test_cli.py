@@ -14,6 +14,13 @@ import numpy as np
 import pytest
 from commands import bench
 
+from bench import __version__
+from bench.api import run
+from bench.core.errors import InputError
+from bench.plugins.catalog import catalog
+from bench.plugins.selection import format_parameters
+from bench.running.run import Options, Run
+
 COLUMNS = [
     "dataset",
     "instance",
@@ -122,6 +129,7 @@ def test_dry_run_writes_nothing(tmp_path: Path) -> None:
         (("run", "-m", "spectral[normalised=maybe]"), "takes bool, not maybe"),
         (("run", "-m", "spectral["), "cannot read the selection 'spectral['"),
         (("run", "-d", "erdos-renyi[n=1]"), "n must be from 2 to 30000, not 1"),
+        (("run", "-d", "1dsfm", "--protocol", "componnt"), "takes truth-subgraph or component, not componnt"),
         (("run", "-d", "1dsfm[scene=Elis_Island]"), "did you mean 'Ellis_Island'?"),
         (("run", "--data-dir", "nowhere"), "nowhere"),
         (("table", "nowhere"), "nowhere is not the folder of a run"),
@@ -204,6 +212,31 @@ def test_a_plugin_joins_the_suite_when_no_methods_are_named(faulty_plugin: Path,
     assert "l1-irls" in done.stdout
 
 
+def test_a_bare_method_is_its_default_and_a_bare_dataset_what_the_suite_has_of_it(tmp_path: Path) -> None:
+    def chosen(*methods: str) -> set[tuple[str, str]]:
+        jobs = [cell.job for cell in Run("quick", methods, ["erdos-renyi"], Options(out=tmp_path)).cells]
+        assert {job.instance for job in jobs} == {"n40-missing0.5", "n100-missing0.5", "n100-missing0.8"}
+        return {(job.method, format_parameters(job.parameters)) for job in jobs}
+
+    assert chosen("spectral") == {("spectral", "")}
+    assert chosen("spectral[normalised=false]", "shonan") == {("spectral", "normalised=false"), ("shonan", "")}
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"methods": "l1-irls"}, r"methods takes a list of selections, such as \['l1-irls'\], not 'l1-irls' alone"),
+        ({"datasets": "folded"}, "datasets takes a list"),
+        ({"seed": 3}, "run takes no 'seed'; did you mean 'seeds'?"),
+        ({"colour": "red"}, "run takes no 'colour'; there are: budget, data_dir"),
+    ],
+)
+def test_misuse_from_python_is_one_sentence(tmp_path: Path, given: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        run("quick", **{"out": tmp_path / "run"} | given)  # type: ignore[arg-type]
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_broken_plugin_is_listed_as_broken(tmp_path: Path) -> None:
     path = tmp_path / "broken.py"
     path.write_text("import no_such_package\n")
@@ -224,6 +257,46 @@ def test_lists_and_help_import_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stderr.strip() == "[]"
+
+
+def test_the_version_is_said() -> None:
+    assert bench("--version").stdout == f"rotsync-bench {__version__}\n"
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Path:
+    """The console script, as an installation makes it."""
+    path = tmp_path / "bin" / "rotsync-bench"
+    path.parent.mkdir()
+    path.write_text("from bench.cli import main\n\nmain()\n")
+    return path
+
+
+def started(*command: object, **environment: str) -> subprocess.CompletedProcess[str]:
+    done = [sys.executable, *map(str, command)]
+    return subprocess.run(done, capture_output=True, text=True, env=os.environ | environment, timeout=60)
+
+
+def test_the_program_is_called_as_the_user_started_it(script: Path) -> None:
+    for start, name in ((("-m", "bench"), "python -m bench"), ((script,), "rotsync-bench")):
+        assert f"Usage: {name} run" in started(*start, "run", "--help").stdout
+        assert f"make one with: {name} run --out nowhere" in started(*start, "table", "nowhere").stderr
+
+
+def test_completion_is_for_the_script_however_it_was_asked_for(script: Path) -> None:
+    for start in (("-m", "bench"), (script,)):
+        shown = started(*start, "--show-completion", "bash", _TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION="1").stdout
+        assert "complete -o default -F _rotsync_bench_completion rotsync-bench" in shown
+        assert "_ROTSYNC_BENCH_COMPLETE=complete_bash" in shown
+        assert "_PYTHON" not in shown
+        words = {"COMP_WORDS": "rotsync-bench comp", "COMP_CWORD": "1", "_ROTSYNC_BENCH_COMPLETE": "complete_bash"}
+        assert started(*start, **words).stdout.split() == ["compare"]
+
+
+def test_data_lists_every_dataset_where_none_is_named(tmp_path: Path) -> None:
+    listed = bench("data", "list", "--data-dir", tmp_path).stdout.splitlines()
+    assert {line.split()[1].split("/")[0] for line in listed} == set(catalog("dataset").entries)
+    assert sum(line.startswith("missing") and "python -m bench data fetch 1dsfm" in line for line in listed) == 15
 
 
 def test_data_lists_what_is_missing_with_the_command(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from bench.datasets._files import folders
 from bench.datasets._simulated.noise import Noise
 from bench.datasets._simulated.statistics import hardness
 from bench.datasets.erdos_renyi import ErdosRenyi
-from bench.datasets.one_dsfm import FETCH, SCENES, OneDSfM
+from bench.datasets.one_dsfm import SCENES, OneDSfM
 from bench.datasets.pose_graph import PoseGraph, propagated
 from bench.plugins.declare import Missing, Source
 
@@ -173,7 +173,7 @@ def test_scenes_that_are_not_on_disk_come_with_the_command(tmp_path: Path) -> No
     sources = list(OneDSfM().sources(tmp_path, 0))
     assert [s.name for s in sources] == sorted([*SCENES, "My_Scene"])
     assert [s.name for s in sources if isinstance(s, Source)] == ["Ellis_Island", "My_Scene"]
-    assert Missing("Alamo", FETCH) in sources
+    assert Missing("Alamo") in sources
 
 
 def test_the_users_folder_comes_first(tmp_path: Path, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,14 +15,15 @@ from scenes import write_scene
 from bench.core import so3
 from bench.core.errors import InputError
 from bench.core.problem import Checkpoint, Estimate, Floats, Instance
-from bench.papers.explain import Explained, Setting, candidates, cells, explain, switches, together
-from bench.papers.items.scenes import SceneTable
+from bench.papers.explain.cells import candidates, cells
+from bench.papers.explain.measure import CHOICES, Answer, Measure
+from bench.papers.explain.switches import Explained, Setting, explain, switches, together
+from bench.papers.kinds.scenes.table import SceneTable
 from bench.papers.layout import load_layout
-from bench.papers.measure import CHOICES, Answer, Measure
 from bench.papers.published import read_published
-from bench.papers.tables.explained import explained_grid
 
 METHODS = ("ours", "theirs")
+PROTOCOLS = ("truth-subgraph", "component")
 BASE = Setting("ours", "truth-subgraph", Measure())
 
 
@@ -56,7 +57,7 @@ def stored(method: str, protocol: str) -> tuple[Sequence[Answer], str]:
 
 
 def explained(published: str) -> Explained:
-    return explain("Toy", "Ours", published, BASE, list(switches(BASE, METHODS)), stored)
+    return explain("Toy", "Ours", published, BASE, list(switches(BASE, METHODS, PROTOCOLS)), stored)
 
 
 PLANTED = [
@@ -77,10 +78,11 @@ def test_a_planted_cause_is_named(name: str, choice: str) -> None:
     setting = setting or replace(BASE, measure=replace(BASE.measure, **{name: choice}))
     number = setting.measure.of(ANSWERS[setting.method, setting.protocol])
     result = explained(f"{number:.9f}")
-    best = result.rows.loc[result.rows["gap_after"].idxmin()]
-    assert (best["switch"], best["after"]) == (name, choice)
-    assert best["gap_after"] < 1e-8 < best["gap_before"]
-    assert f"{name} {best['before']} -> {choice}" in result.sentence()
+    best = result.closest
+    assert best is not None
+    assert (best.switch, best.after) == (name, choice)
+    assert best.gap_after < 1e-8 < best.gap_before
+    assert f"{name} {best.before} -> {choice}" in result.sentence()
     assert "100% of the gap closed" in result.sentence()
 
 
@@ -111,7 +113,7 @@ def test_what_is_not_solved_counts_as_wrong_where_asked() -> None:
 
 
 def test_no_switch_is_named_where_none_helps() -> None:
-    numbers = [row["measured"] for _, row in explained("1.0").rows.iterrows()]
+    numbers = [row.measured for row in explained("1.0").rows]
     published = f"{BASE.measure.of(ANSWERS['ours', 'truth-subgraph']):.9f}"
     assert "None of" in explained(published).sentence()
     assert "They agree in the digits that are printed." in explained(published).sentence()
@@ -123,8 +125,8 @@ def test_what_did_not_end_well_is_a_row_with_its_status_and_never_the_closest() 
     def answers(method: str, protocol: str) -> tuple[Sequence[Answer], str]:
         return ([], "timeout") if method == "theirs" else (ANSWERS[method, protocol], "ok")
 
-    result = explain("Toy", "Ours", "9.0", BASE, list(switches(BASE, METHODS)), answers)
-    rows = dict(explained_grid(result, "l1").rows)
+    result = explain("Toy", "Ours", "9.0", BASE, list(switches(BASE, METHODS, PROTOCOLS)), answers)
+    rows = dict(result.grid().rows)
     failed = rows["method", "ours", "theirs"]
     assert [cell.text for cell in failed][::2] == ["TO", "–"]
     bold = [facts for facts, cells in rows.items() if cells[0].bold]
@@ -133,7 +135,7 @@ def test_what_did_not_end_well_is_a_row_with_its_status_and_never_the_closest() 
 
 
 def test_nothing_measured_is_said() -> None:
-    result = explain("Toy", "Ours", "1.0", BASE, list(switches(BASE, METHODS)), lambda *_: ([], "timeout"))
+    result = explain("Toy", "Ours", "1.0", BASE, list(switches(BASE, METHODS, PROTOCOLS)), lambda *_: ([], "timeout"))
     assert "nothing was measured" in result.sentence()
 
 
@@ -143,7 +145,7 @@ def test_over_several_cells_the_switch_that_explains_all_beats_one_that_explains
 
     def cell(scene: int) -> Explained:
         published = f"{replace(BASE.measure, alignment='karcher').of(answers(scene)):.9f}"
-        tried = [s for s in switches(BASE, ()) if s.name != "protocol"]
+        tried = list(switches(BASE, (), ()))
         return explain(f"Scene {scene}", "Ours", published, BASE, tried, lambda *_: (answers(scene), "ok"))
 
     (sentence,) = together([cell(1), cell(2), cell(3)])
@@ -156,7 +158,7 @@ def table() -> tuple[SceneTable, list[dict[str, str]]]:
     layout = load_layout("dmf-synch-2023")
     item = layout.item("table1")
     assert isinstance(item, SceneTable)
-    return item, read_published(layout.folder, item.published)
+    return item, read_published(layout.sources.published, item.published)
 
 
 @pytest.mark.parametrize("name", ["Ellis Island/L1-IRLS", "Ellis_Island/l1-irls", "ellis/l1irls", "Ellis / L1"])

@@ -13,7 +13,7 @@ from scenes import bundle_camera, egs_line, write_scene
 
 from bench.core import so3
 from bench.core.errors import InputError
-from bench.formats import read_graph, rotations_writer, write_rotations
+from bench.formats import read_graph, rotations_writer
 from bench.formats.one_dsfm import read_bundle
 
 IDENTITY = " ".join(map(str, np.eye(3).ravel())) + " 0 0 0"
@@ -368,7 +368,7 @@ def test_rotations_are_written_with_all_digits(tmp_path: Path, suffix: str) -> N
     rotations[1] = np.nan
     path = tmp_path / f"out{suffix}"
     path.write_text("an older file")
-    write_rotations(path, cameras, rotations)
+    rotations_writer(path)(cameras, rotations)
     if suffix == ".npz":
         with np.load(path) as archive:
             read_ids, read = archive["cameras"].tolist(), archive["rotations"]
@@ -392,6 +392,6 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "out.txt"
     path.write_text("an older file")
     with pytest.raises(ValueError, match="zip"):
-        write_rotations(path, np.arange(3), np.zeros((2, 3, 3)))
+        rotations_writer(path)(np.arange(3), np.zeros((2, 3, 3)))
     assert path.read_text() == "an older file"
     assert [p.name for p in tmp_path.iterdir()] == [path.name]

@@ -10,16 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bench.papers.computed import Computed
-from bench.papers.items.claims import Claims
-from bench.papers.items.curves import CurvePlot
-from bench.papers.items.properties import PropertyTable
-from bench.papers.items.scenes import SceneTable
-from bench.papers.items.speedup import Speedup
+from bench.papers.computed import Computed, Score
+from bench.papers.kinds.claims.statements import Claims, Verdict, Verdicts
+from bench.papers.kinds.curves.plot import CurvePlot, Curves, Point
+from bench.papers.kinds.properties import PropertyTable
+from bench.papers.kinds.scenes.table import SceneTable
+from bench.papers.kinds.speedup import Ratio, Side, Speedup
 from bench.papers.layout import load_layout
-from bench.papers.published import read_published
-from bench.papers.tables import claims, paper
-from bench.papers.tables.side_by_side import side_by_side
 from bench.reporting.appearance import Appearance, using
 from bench.reporting.figures import style
 from bench.reporting.figures.captions import captions
@@ -27,7 +24,6 @@ from bench.reporting.figures.plots import figures
 from bench.reporting.tables.grid import Grid, grids
 from bench.reporting.tables.latex import latex, latex_escape
 from bench.scoring.metrics.errors import summary
-from bench.scoring.results import Results
 
 DOCUMENT = r"""\documentclass[10pt,twocolumn,letterpaper]{article}
 \usepackage[margin=0.67in]{geometry}
@@ -69,15 +65,24 @@ def scored(instances: int, methods: list[tuple[str, str, str]] = METHODS, **more
     return pd.DataFrame(rows)
 
 
-def measured(table: SceneTable) -> Computed:
+def measured() -> Computed:
     """Two scenes of the paper, measured."""
-    rows = []
-    for instance in ("Ellis_Island", "Madrid_Metropolis"):
-        for method, params, median in (("dmf-synch", "loss=l1", 0.8), ("dmf-synch", "", 0.5), ("l1-irls", "", 2.0)):
-            row = {"instance": instance, "method": method, "params": params, "status": "ok", "median_deg": median}
-            rows.append(row | {"n_cameras": 176, "edges_percent": 68.1, "hardness": 0.0319, "notes": "50 % of $x_1$"})
-    results = Results(pd.DataFrame(rows), {}, {}, (), "l1", {})
-    return Computed((), results, {"Madrid_Metropolis": ("fewer cameras & an easier subset",)}, ("get Alamo: --fetch",))
+    scores = tuple(
+        Score(
+            "1dsfm",
+            instance,
+            method,
+            median_deg=median,
+            n_cameras=176,
+            edges_percent=68.1,
+            hardness=0.0319,
+            notes="50 % of $x_1$",
+        )
+        for instance in ("Ellis_Island", "Madrid_Metropolis")
+        for method, median in (("dmf-synch[loss=l1]", 0.8), ("dmf-synch", 0.5), ("l1-irls", 2.0))
+    )
+    notes = {"Madrid_Metropolis": ("fewer cameras & an easier subset",)}
+    return Computed("l1", scores=scores, notes=notes, missing=("get Alamo: --fetch",))
 
 
 def every_table() -> Iterator[tuple[str, list[Grid]]]:
@@ -88,24 +93,24 @@ def every_table() -> Iterator[tuple[str, list[Grid]]]:
     many = [(f"m{k}", f"A method with a name {k}", "depth=3,loss=geman-mcclure") for k in range(20)]
     yield "a run of many methods", grids(scored(2, many), {})
     layout = load_layout("dmf-synch-2023")
+    nothing = Computed("l1")
     for name, item in layout.items.items():
         if isinstance(item, SceneTable):
-            for computed in (Computed(), measured(item)):
-                frame = item.compare(read_published(layout.folder, item.published), computed)
-                yield name, [side_by_side(item, frame, computed, "l1")]
+            for computed in (nothing, measured()):
+                yield name, [item.compare(layout.sources, computed).printed()]
         elif isinstance(item, PropertyTable):
-            yield name, [paper.property_grid(item, item.compare())]
+            yield name, [item.compare(layout.sources, nothing).grid()]
         elif isinstance(item, CurvePlot):
-            points = pd.read_csv(REFERENCE / f"{name}.csv")
-            yield name, [paper.point_grid(item, points, "l1", ("a note",))]
+            names = {item.panel.parameter: "panel", item.axis.parameter: "x", item.statistic: "error_deg"}
+            points = pd.read_csv(REFERENCE / f"{name}.csv").rename(columns=names).to_dict("records")
+            yield name, [Curves(item, tuple(Point(**row) for row in points), nothing).grid()]
         elif isinstance(item, Claims):
-            frame = pd.read_csv(REFERENCE / f"{name}.csv")
-            yield name, [claims.claims_grid(item, frame, Computed(), "l1")]
+            rows = pd.read_csv(REFERENCE / f"{name}.csv").to_dict("records")
+            yield name, [Verdicts(item, tuple(Verdict(**row) for row in rows), nothing).grid()]
         else:
             assert isinstance(item, Speedup)
-            numbers = {"iterations": 500, "iteration_s": 8e-4, "total_s": 0.4, "mean_deg": 2.8, "median_deg": 0.5}
-            frame = pd.DataFrame([{"method": item.recipe, **numbers, "times_less": 1.0}])
-            yield name, [claims.speedup_grid(item, frame, Computed(), "l1")]
+            side = Side(item.recipe, 500, 8e-4, 0.4, 2.8, 0.5, 1.0)
+            yield name, [Ratio(item, (side,), nothing).grid()]
 
 
 @pytest.mark.parametrize(("name", "tables"), [pytest.param(*case, id=case[0]) for case in every_table()])
@@ -133,9 +138,7 @@ def test_the_papers_highlights_are_coloured() -> None:
     layout = load_layout("dmf-synch-2023")
     table = layout.item("table1")
     assert isinstance(table, SceneTable)
-    computed = measured(table)
-    frame = table.compare(read_published(layout.folder, table.published), computed)
-    text = latex([side_by_side(table, frame, computed, "l1")])
+    text = latex([table.compare(layout.sources, measured()).printed()])
     lines = {line.split(" & ")[0]: line.removesuffix(r" \\").split(" & ")[1:] for line in text.splitlines()}
     within = [rf"\within{{{value}}}" for value in ("0.6", "0.8", "0.4", "0.5")]
     assert lines["Ellis Island"] == ["227", "50", "0.0088", "0.80", "0.50", "0.8", *within[:3], "2.00", within[3]]

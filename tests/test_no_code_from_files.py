@@ -40,6 +40,7 @@ PLUGIN_IMPORTS = {
     ("bench/plugins/catalog.py", "importlib.util.spec_from_file_location"),
     ("bench/__init__.py", "import_module"),
     ("bench/execution/child.py", "importlib.import_module"),
+    ("bench/papers/layout.py", "importlib.import_module"),  # a module of bench.papers.kinds
     ("bench/execution/server.py", "importlib.import_module"),
 }
 

@@ -11,15 +11,13 @@ from commands import bench
 from scenes import write_scene
 
 from bench.core.errors import InputError
-from bench.papers.computed import Computed
-from bench.papers.items.curves import CurvePlot
-from bench.papers.items.properties import PropertyTable
-from bench.papers.items.scenes import SceneTable
+from bench.papers.computed import Computed, Score
+from bench.papers.kinds.curves.plot import CurvePlot
+from bench.papers.kinds.properties import PropertyTable
+from bench.papers.kinds.scenes.table import SceneTable
 from bench.papers.layout import load_layout, paper_names
 from bench.papers.published import methods_of, read_published
-from bench.papers.tables.paper import property_grid, render, scene_grid
 from bench.plugins.catalog import catalog
-from bench.scoring.results import Results
 
 LAYOUT = """
 title = "A paper"
@@ -111,20 +109,20 @@ def test_every_layout_that_ships_can_be_read_and_names_what_there_is(name: str) 
             assert methods.select(suite.methods)
             assert datasets.select(suite.datasets)
         if isinstance(item, SceneTable):
-            rows = read_published(layout.folder, item.published)
-            frame = item.compare(rows, Computed())
+            rows = read_published(layout.sources.published, item.published)
+            frame = item.compare(layout.sources, Computed("l1")).frame()
             assert list(item.scenes) == [row["scene"] for row in rows]
             assert list(item.measured) == methods_of(rows)
             assert frame["measured"].isna().all()
         if isinstance(item, PropertyTable):
-            assert item.compare()["agree"].dropna().all()
+            assert item.compare(layout.sources, Computed("")).frame()["agree"].dropna().all()
 
 
 def test_the_papers_highlights_follow_from_its_rule() -> None:
     layout = load_layout("dmf-synch-2023")
     table = layout.item("table1")
     assert isinstance(table, SceneTable)
-    frame = table.compare(read_published(layout.folder, table.published), Computed())
+    frame = table.compare(layout.sources, Computed("l1")).frame()
     near = frame[frame["near_published"]].groupby("quantity")["scene"].agg(set)
     assert near["PoGO-Net"] == {
         "Alamo", "Ellis Island", "Montreal Notre Dame", "Piazza del Popolo", "Vienna Cathedral",
@@ -134,32 +132,32 @@ def test_the_papers_highlights_follow_from_its_rule() -> None:
     assert "DMF-Synch" not in near
 
 
-def results(**medians: dict[str, float]) -> Results:
-    rows = [
-        {
-            "instance": instance,
-            "method": method,
-            "params": "",
-            "status": "ok" if np.isfinite(median) else "timeout",
-            "median_deg": median,
-            "n_cameras": 9,
-            "edges_percent": 60.5,
-            "hardness": 0.25,
-            "notes": "",
-        }
+def scores(**medians: dict[str, float]) -> tuple[Score, ...]:
+    return tuple(
+        Score(
+            "1dsfm",
+            instance,
+            method,
+            status="ok" if np.isfinite(median) else "timeout",
+            median_deg=median,
+            n_cameras=9,
+            edges_percent=60.5,
+            hardness=0.25,
+        )
         for instance, by_method in medians.items()
         for method, median in by_method.items()
-    ]
-    return Results(pd.DataFrame(rows), {}, {}, (), "l1", {})
+    )
 
 
 def test_differences_and_marks_are_those_worked_out_by_hand(layout_file: Path) -> None:
     layout = load_layout(str(layout_file))
     table = layout.item("t")
     assert isinstance(table, SceneTable)
-    measured = results(Ellis_Island={"spectral": 0.75, "spanning-tree": np.nan}, Madrid_Metropolis={"spectral": np.nan})
-    computed = Computed((), measured, {"Ellis_Island": ("not the paper's cameras",)}, ("get it with: fetch",))
-    frame = table.compare(read_published(layout.folder, table.published), computed)
+    measured = scores(Ellis_Island={"spectral": 0.75, "spanning-tree": np.nan}, Madrid_Metropolis={"spectral": np.nan})
+    notes = {"Ellis_Island": ("not the paper's cameras",)}
+    computed = Computed("l1", scores=measured, notes=notes, missing=("get it with: fetch",))
+    found = table.compare(layout.sources, computed)
+    frame = found.frame()
     cells = frame.set_index(["instance", "quantity", "method"])
     assert cells.loc[("Ellis_Island", "Ours", "spectral"), "difference"] == pytest.approx(-0.05)
     assert cells.loc[("Ellis_Island", "edges_percent", ""), "difference"] == pytest.approx(10.5)
@@ -169,7 +167,7 @@ def test_differences_and_marks_are_those_worked_out_by_hand(layout_file: Path) -
     near = cells["near_published"].xs("Theirs", level="quantity").droplevel("method")
     assert near.to_dict() == {"Ellis_Island": True, "Madrid_Metropolis": False, "Alamo": False}
 
-    text, _ = render(scene_grid(table, frame, computed, "l1"), frame, "markdown")
+    text, _ = found.text("markdown")
     assert "| Ellis Island (a) | measured | 9 | 60.5 | 0.2500 | 0.75 | TO | – |" in text
     assert "|  | published | 9 | 50 | 0.1000 | 0.8 | 0.8 | **1.3** |" in text
     assert "|  | difference | 0 | +10.5 | +0.1500 | −0.05 |  |  |" in text
@@ -264,7 +262,7 @@ def test_what_differs_from_the_published_properties_is_bold() -> None:
         published={"Tree": {"supervised": True}, "Elsewhere": {"supervised": True}},
         declared={"Tree": "spanning-tree", "Spectral": "spectral"},
     )
-    text, _ = render(property_grid(table, table.compare()), table.compare(), "markdown")
+    text, _ = table.compare(load_layout("dmf-synch-2023").sources, Computed("")).text("markdown")
     assert "| Tree | spanning-tree | **no** | **yes** |" in text
     assert "| Elsewhere | – | – | yes |" in text
     assert "| Spectral | spectral | no | – |" in text
@@ -325,7 +323,7 @@ def test_published_numbers_that_do_not_fit_say_where(layout_file: Path, old: str
     assert isinstance(table, SceneTable)
     (layout_file.parent / "t.csv").write_text(PUBLISHED.replace(old, new))
     with pytest.raises(InputError) as caught:
-        table.compare(read_published(layout.folder, table.published), Computed())
+        table.compare(layout.sources, Computed("l1"))
     assert says in str(caught.value)
 
 

@@ -5,9 +5,11 @@ Nothing heavy is imported before a verb runs, so that ``--help`` answers at once
 
 import errno
 import sys
+from typing import Annotated
 
 import typer
 
+from bench import __version__
 from bench.cli import (
     bibtex,
     check,
@@ -26,17 +28,34 @@ from bench.cli import (
     solve,
     table,
 )
+from bench.core.program import SCRIPT, program
 
+COMPLETION = ("--install-completion", "--show-completion")
 REFUSED = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 app = typer.Typer(
-    name="bench",
-    help="Compare rotation synchronization (multiple rotation averaging) methods.",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-app.command("run", epilog=run.EPILOG)(run.run)
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"{SCRIPT} {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def bench(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_say_version, help="Say which version this is.")
+    ] = False,
+) -> None:
+    """Compare rotation synchronization (multiple rotation averaging) methods."""
+
+
+app.command("run")(run.run)
 app.command("rerun")(rerun.rerun)
 app.command("list")(list_.list_)
 app.command("table")(table.table)
@@ -47,7 +66,7 @@ app.command("paper")(paper.paper)
 app.command("merge")(merge.merge)
 app.command("doctor")(doctor.doctor)
 app.command("bibtex")(bibtex.bibtex)
-app.command("map", epilog=map.EPILOG)(map.map_)
+app.command("map")(map.map_)
 app.add_typer(data.app, name="data")
 app.command("solve")(solve.solve)
 app.command("new")(new.new)
@@ -59,7 +78,9 @@ def main() -> None:
     from bench.core.errors import InputError
 
     try:
-        app(prog_name="python -m bench")
+        # A shell completes a command by its name: that of the script, for it cannot be `python`.
+        name = SCRIPT if any(word.startswith(COMPLETION) for word in sys.argv[1:2]) else program()
+        app(prog_name=name, complete_var=f"_{SCRIPT.upper().replace('-', '_')}_COMPLETE")
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(2)

@@ -1,26 +1,15 @@
 """``bench compare``: one run against another; the exit code says whether anything is worse."""
 
-import shutil
-import sys
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, ProtocolOption, run_folder
+from bench.cli.options import Align, AlignOption, Format, ProtocolOption, console, run_folder, show
 
 if TYPE_CHECKING:
     from bench.scoring.results import Results
     from bench.storage.store import Store
-
-
-class CompareFormat(StrEnum):
-    """How a comparison is written."""
-
-    CONSOLE = "console"
-    MARKDOWN = "markdown"
-    CSV = "csv"
 
 
 def compare(
@@ -31,7 +20,7 @@ def compare(
     threshold: Annotated[
         float, typer.Option(metavar="RATIO", help="A change by less than this ratio is no regression.")
     ] = 1.05,
-    format: CompareFormat = CompareFormat.CONSOLE,
+    format: Format = Format.CONSOLE,
 ) -> None:
     """Say what became better or worse from RUN_A to RUN_B, on the problems, methods and seeds that both have.
 
@@ -39,8 +28,7 @@ def compare(
     """
     from bench.core.errors import InputError
     from bench.reporting.tables.compared import comparison_grid, comparison_table, verdict
-    from bench.reporting.tables.console import render_grid
-    from bench.reporting.tables.grid import markdown
+    from bench.reporting.tables.text import text_of
     from bench.scoring.comparison import compare as compared
     from bench.scoring.results import score
     from bench.storage.store import Store
@@ -48,22 +36,11 @@ def compare(
     if not threshold >= 1:
         raise InputError(f"--threshold is a ratio of at least 1, such as 1.05, not {threshold:g}")
     stores = [Store.open(run_folder(run)) for run in (first, second)]
-    old, new = (score(store, align.value, protocol.value if protocol else None) for store in stores)
+    old, new = (score(store, align.value, protocol) for store in stores)
     found = compared(old, new, threshold, no_times=_why_no_times(stores, [old, new]))
-    if format is CompareFormat.CSV:
-        typer.echo(comparison_table(found).to_csv(index=False), nl=False)
-        for note in found.notes:
-            typer.echo(note, err=True)
-    else:
-        grid = comparison_grid(found, align.value, threshold)
-        width = shutil.get_terminal_size((100, 24)).columns
-        text = (
-            markdown([grid])
-            if format is CompareFormat.MARKDOWN
-            else render_grid(grid, width=width, terminal=sys.stdout.isatty())
-        )
-        typer.echo(text, nl=False)
-    typer.echo(verdict(found), err=format is CompareFormat.CSV)
+    grid = comparison_grid(found, align.value, threshold)
+    show(text_of(grid, comparison_table(found), format.value, **console()))
+    typer.echo(verdict(found), err=format is Format.CSV)
     raise typer.Exit(1 if found.regressed else 0)
 
 

@@ -5,26 +5,35 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bench.cli.options import DataDirOption, Protocol, ProtocolOption
+from bench.cli.options import DataDirOption, ProtocolOption
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from bench.plugins.declare import Missing, Source
 
 app = typer.Typer(help="List, fetch, verify and inspect data.", no_args_is_help=True)
 
-Name = Annotated[str, typer.Argument(metavar="DATASET", help="A selection, such as '1dsfm[scene=Ellis_Island]'.")]
+Name = Annotated[str, typer.Argument(metavar="DATASET", help="A selection, such as 'name[scene=x]'.")]
 
 
 @app.command("list")
-def list_(name: Name = "1dsfm", data_dir: DataDirOption = None, protocol: ProtocolOption = None) -> None:
-    """List the instances of a dataset, on disk or not, with the command that gets what is missing."""
+def list_(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[DATASET]", help="A selection.  [default: every dataset]")
+    ] = None,
+    data_dir: DataDirOption = None,
+    protocol: ProtocolOption = None,
+) -> None:
+    """List instances: here, missing (with the command that gets them), or made anew for every seed."""
     from bench.plugins.declare import Missing
 
-    for source in _sources(name, data_dir, protocol):
+    for dataset, source in _sources(name, data_dir, protocol):
         if isinstance(source, Missing):
-            typer.echo(f"missing   {source.name:<24} {source.command}")
+            state, detail = "missing", source.how(dataset)
         else:
-            typer.echo(f"here      {source.name:<24} {source.revision[:12]}")
+            state, detail = "made" if source.seeded else "here", source.revision[:12]
+        typer.echo(f"{state:<9} {f'{dataset}/{source.name}':<34} {detail}")
 
 
 @app.command("inspect")
@@ -34,9 +43,9 @@ def inspect(name: Name, data_dir: DataDirOption = None, protocol: ProtocolOption
 
     from bench.plugins.declare import Missing
 
-    for source in _sources(name, data_dir, protocol):
+    for dataset, source in _sources(name, data_dir, protocol):
         if isinstance(source, Missing):
-            typer.echo(f"{source.name}: not on disk; {source.command}")
+            typer.echo(f"{source.name}: not on disk; {source.how(dataset)}")
             continue
         instance = source.load()
         problem = instance.problem
@@ -80,15 +89,16 @@ def verify(name: Annotated[str, typer.Argument(metavar="DATASET")], data_dir: Da
     raise typer.Exit(1 if wrong else 0)
 
 
-def _sources(name: str, data_dir: Path | None, protocol: Protocol | None) -> "list[Source | Missing]":
+def _sources(name: str | None, data_dir: Path | None, protocol: str | None) -> "Iterator[tuple[str, Source | Missing]]":
+    """Every instance of a selection, or of all datasets, with the name of its dataset."""
     from bench.plugins.catalog import catalog
 
-    found = []
-    for info, parameters in catalog("dataset").select([name]):
+    known = catalog("dataset")
+    for info, parameters in known.select([name] if name else known.entries):
         if protocol is not None and "protocol" in info.defaults():
-            parameters |= {"protocol": protocol.value}
-        found += list(info.configure(parameters).sources(data_dir, 0))
-    return found
+            parameters |= {"protocol": protocol}
+        for source in info.configure(parameters).sources(data_dir, 0):
+            yield info.name, source
 
 
 def _fetchable(name: str) -> Any:

@@ -18,6 +18,7 @@ def doctor(
     After --repair, the command that made the run makes again what was damaged.
     """
     from bench.core import outcome
+    from bench.core.program import program
     from bench.storage import doctor as doctors
     from bench.storage.store import ASIDE, Store
 
@@ -29,7 +30,7 @@ def doctor(
         doctors.repair(folder, findings)
         typer.echo(f"{len(findings)} findings, repaired; what was damaged is in {folder / ASIDE}")
     elif findings:
-        typer.echo(f"{len(findings)} findings; mend them with: python -m bench doctor {folder} --repair")
+        typer.echo(f"{len(findings)} findings; mend them with: {program()} doctor {folder} --repair")
         raise typer.Exit(1)
     store = Store.open(folder)
     jobs = store.jobs()

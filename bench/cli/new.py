@@ -54,6 +54,7 @@ def new(
 ) -> None:
     """Write a working method of one file, to be replaced by yours."""
     from bench.core.errors import InputError
+    from bench.core.program import program
 
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
         raise InputError(
@@ -68,5 +69,5 @@ def new(
         TEMPLATE.format(name=name, title=" ".join(words).capitalize(), cls="".join(w.capitalize() for w in words)),
         encoding="utf-8",
     )
-    typer.echo(f"wrote {path}; next:\n  python -m bench check method {name} --plugin {path}")
-    typer.echo(f"  python -m bench run --plugin {path} -m {name} -m l1-irls -d erdos-renyi")
+    typer.echo(f"wrote {path}; next:\n  {program()} check method {name} --plugin {path}")
+    typer.echo(f"  {program()} run --plugin {path}")

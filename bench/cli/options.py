@@ -1,8 +1,10 @@
 """Options that several verbs share."""
 
+import shutil
+import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,13 +16,6 @@ class Align(StrEnum):
     CHORDAL = "chordal"
     KARCHER = "karcher"
     ANCHORS = "anchors"
-
-
-class Protocol(StrEnum):
-    """Which cameras of a real scene are solved and scored."""
-
-    TRUTH_SUBGRAPH = "truth-subgraph"
-    COMPONENT = "component"
 
 
 class Rerun(StrEnum):
@@ -50,7 +45,8 @@ class Format(StrEnum):
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or its name under results/runs.")]
 AlignOption = Annotated[Align, typer.Option("--align", help="Rule that removes the gauge; re-scores, runs nothing.")]
 ProtocolOption = Annotated[
-    Protocol | None, typer.Option("--protocol", help="Which cameras of a real scene are solved and scored.")
+    str | None,
+    typer.Option("--protocol", metavar="P", help="Which cameras are solved and scored, where data give the choice."),
 ]
 PluginOption = Annotated[
     list[Path] | None,
@@ -79,6 +75,19 @@ def wear(given: Path | None = None, width: str | None = None) -> None:
     if width is not None:
         wanted = replace(wanted, width_in=width_in(width))
     put_in_force(wanted)
+
+
+def console() -> dict[str, Any]:
+    """Columns of the terminal, and whether there is one: what a table has to know of it."""
+    return {"width": shutil.get_terminal_size((100, 24)).columns, "terminal": sys.stdout.isatty()}
+
+
+def show(table: tuple[str, tuple[str, ...]]) -> None:
+    """Print a table on standard output, and the notes that are not in it on standard error."""
+    text, notes = table
+    typer.echo(text, nl=not text.endswith("\n"))
+    for note in notes:
+        typer.echo(note, err=True)
 
 
 def run_folder(given: Path) -> Path:

@@ -31,6 +31,6 @@ def plot(
 
     wear(style, width)
     folder = run_folder(run)
-    results = score(Store.open(folder), align.value, protocol.value if protocol else None, checkpoints=True)
+    results = score(Store.open(folder), align.value, protocol, checkpoints=True)
     for path in write_plots(results, out or folder / "plots"):
         typer.echo(path)

@@ -26,5 +26,5 @@ def report(
 
     folder = run_folder(run)
     store = Store.open(folder)
-    results = score(store, align.value, protocol.value if protocol else None, checkpoints=True)
+    results = score(store, align.value, protocol, checkpoints=True)
     typer.echo(write_report(store, under_every_rule(store, results), out or folder / FILE_NAME))

@@ -1,22 +1,26 @@
 """``bench run``: compare methods, then say where tables and plots are."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, DataDirOption, Engine, PluginOption, ProtocolOption, Rerun, wear
+from bench.cli.options import (
+    Align,
+    AlignOption,
+    DataDirOption,
+    Engine,
+    PluginOption,
+    ProtocolOption,
+    Rerun,
+    console,
+    wear,
+)
+from bench.core.program import program
 from bench.running.progress.live import execute, foreseen
 
 if TYPE_CHECKING:
     from bench.running.run import Run
-
-EPILOG = (
-    "Examples: python -m bench run | "
-    "python -m bench run --suite 1dsfm --data-dir DIR | "
-    "python -m bench run -m 'dmf-synch[depth=[2,3]]' -m l1-irls -d 'erdos-renyi[n=100,missing=0.8]' --seeds 10"
-)
 
 
 def run(
@@ -25,11 +29,18 @@ def run(
     ] = None,
     method: Annotated[
         list[str] | None,
-        typer.Option("--method", "-m", metavar="M", help="Only these methods; repeat for more."),
+        typer.Option(
+            "--method",
+            "-m",
+            metavar="M",
+            help="In place of the suite's; a bare name is the default configuration. Repeats.",
+        ),
     ] = None,
     dataset: Annotated[
         list[str] | None,
-        typer.Option("--dataset", "-d", metavar="D", help="Only these datasets; repeat for more."),
+        typer.Option(
+            "--dataset", "-d", metavar="D", help="Only these; a bare name keeps the suite's selections of it. Repeats."
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -73,6 +84,10 @@ def run(
 
     With --timing, the jobs are timed instead: the table has median and least solve time and the ratio to the
     baseline of the suite (by default its first method).
+
+    Example: --suite 1dsfm --data-dir DIR
+
+    Example: -m 'dmf-synch[depth=[2,3]]' -m l1-irls -d 'folded[n=100]' --seeds 10
     """
     from bench.running.run import Options, Run
 
@@ -85,7 +100,7 @@ def run(
         timeout_s=timeout,
         memory_gib=memory,
         budget=budget,
-        protocol=protocol.value if protocol else None,
+        protocol=protocol,
         rerun=rerun.value,
         timing=timing,
         rounds=rounds,
@@ -130,8 +145,6 @@ def _list_cells(planned: "Run") -> None:
 
 
 def _present(planned: "Run", align: Align) -> None:
-    import shutil
-
     from bench.reporting.html.page import FILE_NAME, write_report
     from bench.reporting.html.realign import under_every_rule
     from bench.reporting.present import render_table, write_plots, write_tables
@@ -139,9 +152,7 @@ def _present(planned: "Run", align: Align) -> None:
 
     wear()
     results = score(planned.store, align.value, planned.options.protocol, checkpoints=True)
-    width = shutil.get_terminal_size((100, 24)).columns
-    text, _ = render_table(results, "console", width=width, terminal=sys.stdout.isatty())
-    typer.echo(f"\n{text}")
+    typer.echo(f"\n{render_table(results, 'console', **console())[0]}")
     folder = planned.store.folder
     write_tables(results, folder / "tables")
     plots = write_plots(results, folder / "plots")
@@ -149,4 +160,4 @@ def _present(planned: "Run", align: Align) -> None:
     typer.echo(f"plots:  {folder / 'plots'} (PNG, PDF, SVG)" if plots else "plots:  none, nothing was scored")
     report = write_report(planned.store, under_every_rule(planned.store, results), folder / FILE_NAME)
     typer.echo(f"report: {report} (one HTML file, no network)")
-    typer.echo(f"again:  python -m bench table {folder} --align chordal --format latex")
+    typer.echo(f"again:  {program()} table {folder} --align chordal --format latex")

@@ -10,7 +10,7 @@ from bench.cli.options import PluginOption
 
 def solve(
     graph: Annotated[Path, typer.Argument(help="1DSfM folder, EGs.txt, .g2o or .npz.")],
-    method: Annotated[str, typer.Option("--method", "-m", help="A selection, such as 'l1-irls'.")],
+    method: Annotated[str, typer.Option("--method", "-m", help="A selection, such as 'name[parameter=3]'.")],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help=".npz or .txt for the absolute rotations.")],
     seed: Annotated[int, typer.Option()] = 0,
     timeout: Annotated[float, typer.Option(metavar="SECONDS")] = 3600,
@@ -19,20 +19,17 @@ def solve(
     plugin: PluginOption = None,
 ) -> None:
     """Solve one graph with one method and write the absolute rotations (world to camera)."""
-    from bench.core.errors import InputError
     from bench.execution.single import SingleSolver
     from bench.execution.supervise import Limits
     from bench.formats import read_graph, rotations_writer
     from bench.plugins.catalog import catalog
 
     write = rotations_writer(out)
-    chosen = catalog("method", plugin or []).select([method])
-    if len(chosen) != 1:
-        raise InputError(f"solve takes one method, and '{method}' stands for {len(chosen)}")
+    chosen = catalog("method", plugin or []).one(method)
     loaded = read_graph(graph)
     problem = loaded.problem
     typer.echo(f"{graph}: {problem.n} cameras, {problem.m} edges")
-    with SingleSolver(*chosen[0], Limits(timeout, memory), threads) as solver:
+    with SingleSolver(*chosen, Limits(timeout, memory), threads) as solver:
         ended, report, estimate = solver.solve(problem, seed)
     for note in (*loaded.notes, *report.get("notes", ())):
         typer.echo(f"note: {note}")

@@ -1,12 +1,21 @@
 """``bench table``: score a run again and print its table."""
 
-import shutil
-import sys
 from typing import Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, Format, ProtocolOption, RunFolder, StyleOption, run_folder, wear
+from bench.cli.options import (
+    Align,
+    AlignOption,
+    Format,
+    ProtocolOption,
+    RunFolder,
+    StyleOption,
+    console,
+    run_folder,
+    show,
+    wear,
+)
 
 
 def table(
@@ -25,9 +34,5 @@ def table(
     from bench.storage.store import Store
 
     wear(style)
-    results = score(Store.open(run_folder(run)), align.value, protocol.value if protocol else None, oracle=oracle)
-    width = shutil.get_terminal_size((100, 24)).columns
-    text, footnotes = render_table(results, format.value, width=width, terminal=sys.stdout.isatty())
-    typer.echo(text, nl=not text.endswith("\n"))
-    for note in footnotes:
-        typer.echo(note, err=True)
+    results = score(Store.open(run_folder(run)), align.value, protocol, oracle=oracle)
+    show(render_table(results, format.value, **console()))

@@ -1,7 +1,7 @@
 """Files of graphs: what a user can hand to the benchmark, checked line by line.
 
-`read_graph` chooses the reader by what the path is; `write_rotations` writes what a method found. Whatever a
-file's own convention is, it is converted here to R_ij = R_i R_j^T.
+`read_graph` chooses the reader by what the path is; `rotations_writer` gives what writes the rotations that a method
+found. Whatever a file's own convention is, it is converted here to R_ij = R_i R_j^T.
 """
 
 from pathlib import Path
@@ -11,9 +11,9 @@ from bench.formats.graph import GraphFile
 from bench.formats.npz import read_npz
 from bench.formats.one_dsfm import read_egs, read_folder
 from bench.formats.pose_graph import is_pose_graph, read_pose_graph
-from bench.formats.rotations import rotations_writer, write_rotations
+from bench.formats.rotations import rotations_writer
 
-__all__ = ["GraphFile", "read_graph", "rotations_writer", "write_rotations"]
+__all__ = ["GraphFile", "read_graph", "rotations_writer"]
 
 
 def read_graph(path: str | Path) -> GraphFile:

@@ -26,8 +26,10 @@ def rotations_writer(path: str | Path) -> Writer:
         parted by spaces, after a ``#`` line that names the columns) or ``.csv`` (the same with commas and a
         plain header).
 
-    Returns ------- A function of the ids (n,) and the rotations (n, 3, 3), world to camera, NaN where a
-    camera was not solved. It writes all digits, and replaces a file that exists only by a whole one.
+    Returns
+    -------
+    A function of the ids (n,) and the rotations (n, 3, 3), world to camera, NaN where a camera was not solved. It
+    writes all digits, and replaces a file that exists only by a whole one.
 
     Raises
     ------
@@ -53,11 +55,6 @@ def rotations_writer(path: str | Path) -> Writer:
             part.unlink(missing_ok=True)
 
     return replace
-
-
-def write_rotations(path: str | Path, cameras: Ids, rotations: Floats) -> None:
-    """Write rotations (n, 3, 3) of cameras with these ids (n,), as `rotations_writer` says."""
-    rotations_writer(path)(cameras, rotations)
 
 
 def _write_npz(file: BinaryIO, cameras: Ids, rotations: Floats) -> None:

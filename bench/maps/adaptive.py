@@ -105,19 +105,6 @@ def boundary(success: Bools) -> Iterator[tuple[tuple[float, float], tuple[float,
         yield (x - 0.5, y + 0.5), (x + 0.5, y + 0.5)
 
 
-def farthest(ours: Bools, other: Bools) -> float:
-    """How many cells the boundaries of two maps are apart at most, in either direction.
-
-    The greatest Chebyshev distance from the middle of a side of one boundary to the nearest of the other
-    (Hausdorff's distance); 0 where there is no boundary in either map, infinite where there is in one only.
-    """
-    a, b = (np.mean([*boundary(m)] or np.empty((0, 2, 2)), axis=1) for m in (ours, other))
-    if not len(a) or not len(b):
-        return 0.0 if len(a) == len(b) else float("inf")
-    apart = np.abs(a[:, None] - b).max(axis=2)
-    return float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))
-
-
 def _lattice(count: int) -> list[int]:
     """Indices about `STRIDE` apart, both ends among them."""
     return sorted({round(v) for v in np.linspace(0, count - 1, -(-(count - 1) // STRIDE) + 1)})

@@ -18,7 +18,6 @@ class Axis:
 
     parameter: str
     values: tuple[int | float, ...]
-    logarithmic: bool = False
 
 
 def parse_axis(text: str, cells: int, dataset: Info) -> Axis:
@@ -43,9 +42,9 @@ def parse_axis(text: str, cells: int, dataset: Info) -> Axis:
     if not equals or len(parts) not in (2, 3) or (len(parts) == 3 and parts[2] != "log"):
         raise InputError(f"cannot read the axis '{text}': the form is {FORM}")
     low, high = (_number(part, text) for part in parts[:2])
-    logarithmic = len(parts) == 3
     if not low < high:
         raise InputError(f"axis '{text}': {parts[0]} is not below {parts[1]}")
+    logarithmic = len(parts) == 3
     if logarithmic and low <= 0:
         raise InputError(f"axis '{text}': a logarithmic axis starts above zero")
     spaced = (np.geomspace if logarithmic else np.linspace)(low, high, cells)
@@ -55,7 +54,7 @@ def parse_axis(text: str, cells: int, dataset: Info) -> Axis:
         values = tuple(float(f"{v:.{DIGITS}g}") for v in spaced)
     if len(values) < FEWEST_CELLS:
         raise InputError(f"axis '{text}' has {len(values)} cells; a map needs at least {FEWEST_CELLS} a side")
-    return Axis(name.strip(), values, logarithmic)
+    return Axis(name.strip(), values)
 
 
 def parse_cells(text: str) -> tuple[int, int]:

@@ -1,10 +1,9 @@
 """A phase map drawn: a panel for each method, and one with every boundary and the lines of theory."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
@@ -13,10 +12,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator
 
 from bench.core.problem import Floats
-from bench.maps.adaptive import Bools, boundary
+from bench.maps.adaptive import boundary
 from bench.maps.axes import Axis
 from bench.maps.bounds import Limits
 from bench.maps.criterion import Criterion
+from bench.maps.sweep import Layers
 from bench.reporting.figures.style import COLORS, LINES, describe, panels, styled
 
 OUTCOMES = LinearSegmentedColormap.from_list("outcomes", ["#f0b489", "#f7f7f7", "#8fbfe0"])
@@ -28,35 +28,38 @@ INK = "#222222"
 
 
 def draw(
-    frame: pd.DataFrame, axes: tuple[Axis, Axis], success: Criterion, limits: Limits | None, title: str, caption: str
+    layers: Mapping[str, Layers],
+    axes: tuple[Axis, Axis],
+    success: Criterion,
+    limits: Limits | None,
+    title: str,
+    caption: str,
 ) -> Figure:
-    """Draw a map, see `bench.maps.sweep.PhaseMap.frame`.
+    """Draw a map.
 
     Parameters
     ----------
-    frame, axes
-        The map, and its horizontal and vertical axis.
+    layers, axes
+        What is known of each method, and the horizontal and vertical axis.
     success, limits
         What counts as success, and what theory says, where it does.
     title, caption
         What stands above and below.
     """
-    methods = list(dict.fromkeys(frame["method"]))
     lines = _lines(limits, success) if limits is not None else []
-    looks = {m: (COLORS[k % len(COLORS)], LINES[k // len(COLORS) % len(LINES)]) for k, m in enumerate(methods)}
+    looks = {m: (COLORS[k % len(COLORS)], LINES[k // len(COLORS) % len(LINES)]) for k, m in enumerate(layers)}
     with styled():
         handles = [Line2D([], [], color=color, linestyle=line, label=m) for m, (color, line) in looks.items()]
         handles += [Line2D([], [], color=INK, linewidth=1, linestyle=line, label=label) for label, line, _, _ in lines]
-        figure, drawn = panels(len(methods) + 1, 2.3, 2.2, handles)
-        widths = np.linspace(WIDEST, THINNEST, len(methods))
+        figure, drawn = panels(len(layers) + 1, 2.3, 2.2, handles)
+        widths = np.linspace(WIDEST, THINNEST, len(layers))
         together = drawn[-1]
         together.set_title("every boundary", loc="left")
-        for ax, method, width in zip(drawn, methods, widths, strict=False):
-            own = frame[frame["method"] == method]
+        for ax, (method, own), width in zip(drawn, layers.items(), widths, strict=False):
             color, style = looks[method]
             ax.set_title(method, loc="left")
-            _cells(ax, own, axes)
-            ends = list(boundary(grid_of(own, "success", axes).astype(bool)))
+            _cells(ax, own)
+            ends = list(boundary(own.success))
             ax.add_collection(LineCollection(ends, colors=INK, linewidths=1.6))
             together.add_collection(LineCollection(ends, colors=color, linestyles=[style], linewidths=float(width)))
         for ax in drawn:
@@ -69,19 +72,6 @@ def draw(
         _scale(drawn[0], axes)
         describe(figure, title, caption)
     return figure
-
-
-def grid_of(own: pd.DataFrame, column: str, axes: tuple[Axis, Axis]) -> Floats:
-    """One column of one method as an array (nx, ny)."""
-    wide = own.pivot(index=axes[0].parameter, columns=axes[1].parameter, values=column)
-    return np.asarray(wide.to_numpy(dtype=float))
-
-
-def successes(frame: pd.DataFrame, axes: tuple[Axis, Axis]) -> dict[str, Bools]:
-    """For each method, which cells (nx, ny) succeed."""
-    return {
-        str(method): grid_of(own, "success", axes).astype(bool) for method, own in frame.groupby("method", sort=False)
-    }
 
 
 def _lines(limits: Limits, success: Criterion) -> list[tuple[str, Any, Floats, float]]:
@@ -100,11 +90,10 @@ def _lines(limits: Limits, success: Criterion) -> list[tuple[str, Any, Floats, f
     ]
 
 
-def _cells(ax: Axes, own: pd.DataFrame, axes: tuple[Axis, Axis]) -> None:
+def _cells(ax: Axes, own: Layers) -> None:
     """Colours by the share of successes, faint where it is only expected; a dot for each sampled cell."""
-    samples = grid_of(own, "samples", axes)
-    expected, hits = grid_of(own, "success", axes), grid_of(own, "successes", axes)
-    share = np.where(samples > 0, hits / np.maximum(samples, 1), expected)
+    samples = own.samples
+    share = np.where(samples > 0, own.successes / np.maximum(samples, 1), own.success)
     ax.imshow(
         share.T, origin="lower", aspect="auto", cmap=OUTCOMES, vmin=0, vmax=1, alpha=np.where(samples > 0, 1, FAINT).T
     )
@@ -125,21 +114,21 @@ def _ticks(count: int) -> Sequence[int]:
     return range(0, count, -(-count // TICKS))
 
 
-def summary(frame: pd.DataFrame, most: int) -> Iterable[str]:
+def summary(layers: Mapping[str, Layers], most: int) -> Iterable[str]:
     """A line for each method: how much of the map it solves, and what finding that out took.
 
     Parameters
     ----------
-    frame
-        The map.
+    layers
+        What is known of each method.
     most
         Samples of a cell in the full grid.
     """
-    width = max(map(len, frame["method"]))
-    for method, own in frame.groupby("method", sort=False):
-        taken, grid = own["samples"].sum(), most * len(own)
-        failed = f", {own['failed'].sum()} without an answer" if own["failed"].any() else ""
+    width = max(map(len, layers))
+    for method, own in layers.items():
+        taken, grid = own.samples.sum(), most * own.samples.size
+        failed = f", {own.failed.sum()} without an answer" if own.failed.any() else ""
         yield (
-            f"{method:<{width}}  succeeds in {own['success'].mean():4.0%} of the cells; "
+            f"{method:<{width}}  succeeds in {own.success.mean():4.0%} of the cells; "
             f"{taken} solves of {grid} ({taken / grid:.0%}){failed}"
         )

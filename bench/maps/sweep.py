@@ -1,16 +1,15 @@
 """A phase map in the making: samples are ordinary jobs of an ordinary run, asked for round by round."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bench.core import outcome
 from bench.core.errors import InputError
-from bench.core.problem import Instance
-from bench.maps.adaptive import Sample, Tally, every_sample, next_samples
+from bench.core.problem import Floats, Instance
+from bench.maps.adaptive import Bools, Counts, Sample, Tally, every_sample, next_samples
 from bench.maps.axes import Axis
 from bench.maps.bounds import Drawn
 from bench.maps.criterion import Criterion, median_of_all
@@ -54,6 +53,10 @@ class Sweep:
         """Cells along x and along y."""
         return len(self.x.values), len(self.y.values)
 
+    def varied(self, x: int, y: int) -> dict[str, Any]:
+        """The two parameters in a cell."""
+        return {self.x.parameter: self.x.values[x], self.y.parameter: self.y.values[y]}
+
 
 @dataclass(frozen=True)
 class _Sampled:
@@ -62,6 +65,27 @@ class _Sampled:
     median_deg: float
     success: bool
     answered: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """What a map knows of one method, all (nx, ny).
+
+    Parameters
+    ----------
+    samples, successes, failed
+        How many samples were taken, succeeded, and had no answer.
+    median_deg
+        Mean over the samples that have an answer; NaN where none has.
+    success
+        Whether more than half of the samples succeed, or in a cell without any, whether the nearest sampled cell does.
+    """
+
+    samples: Counts
+    successes: Counts
+    failed: Counts
+    median_deg: Floats
+    success: Bools
 
 
 class PhaseMap:
@@ -82,7 +106,7 @@ class PhaseMap:
 
     def __init__(self, sweep: Sweep, options: Options) -> None:
         self.sweep = sweep
-        self.dataset, given = one_dataset(sweep.dataset, options.plugins)
+        self.dataset, given = catalog("dataset", options.plugins).one(sweep.dataset)
         for axis in (sweep.x, sweep.y):
             if axis.parameter in given:
                 raise InputError(f"'{axis.parameter}' is an axis of the map; leave it out of '{sweep.dataset}'")
@@ -149,52 +173,43 @@ class PhaseMap:
                 self._count(method, sample)
         return True
 
-    def frame(self) -> "pd.DataFrame":
-        """The map, one row for each method and cell.
+    def layers(self) -> dict[str, Layers]:
+        """The map of each method."""
+        return {method: self._layers(method, tally) for method, tally in self.tallies.items()}
 
-        Returns
-        -------
-        DataFrame
-            ``method``, the two parameters, ``samples, successes, failed`` (without an answer), ``median_deg`` (mean
-            over the samples that have an answer) and ``success``: whether more than half of the samples succeed, or in
-            a cell without any, whether the nearest sampled cell does.
-        """
+    def _layers(self, method: str, tally: Tally) -> Layers:
+        answered, medians_deg = np.zeros(self.sweep.shape, np.intp), np.full(self.sweep.shape, np.nan)
+        for place, told in self._samples[method].items():
+            medians = [sampled.median_deg for sampled in told if sampled.answered]
+            answered[place] = len(medians)
+            medians_deg[place] = np.mean(medians) if medians else np.nan
+        return Layers(tally.tried, tally.hits, tally.tried - answered, medians_deg, tally.expected())
+
+    def frame(self) -> "pd.DataFrame":
+        """The map, one row for each method and cell: the two parameters, then the fields of `Layers`."""
         import pandas as pd
 
-        rows = []
-        for method, tally in self.tallies.items():
-            expected = tally.expected()
-            for x, y in np.ndindex(*self.sweep.shape):
-                told = self._samples[method].get((x, y), [])
-                medians = [sampled.median_deg for sampled in told if sampled.answered]
-                rows.append(
-                    {
-                        "method": method,
-                        self.sweep.x.parameter: self.sweep.x.values[x],
-                        self.sweep.y.parameter: self.sweep.y.values[y],
-                        "samples": len(told),
-                        "successes": int(tally.hits[x, y]),
-                        "failed": len(told) - len(medians),
-                        "median_deg": float(np.mean(medians)) if medians else np.nan,
-                        "success": bool(expected[x, y]),
-                    }
-                )
-        return pd.DataFrame(rows)
+        x, y = self.sweep.x, self.sweep.y
+        return pd.DataFrame(
+            [
+                {"method": method, x.parameter: x.values[i], y.parameter: y.values[j]}
+                | {name: values[i, j] for name, values in vars(own).items()}
+                for method, own in self.layers().items()
+                for i, j in np.ndindex(*self.sweep.shape)
+            ]
+        )
 
     def problems(self) -> Iterator[Drawn]:
         """Every cell's place, complete parameters and instances, made anew: most are never solved."""
         first = self.methods[0]
         for x, y in np.ndindex(*self.sweep.shape):
             sources = [self._cells[first, (x, y, seed)].source for seed in range(self.sweep.seeds)]
-            yield (x, y), self.parameters | self._varied(x, y), (source.load() for source in sources)
-
-    def _varied(self, x: int, y: int) -> dict[str, Any]:
-        return _varied(self.sweep, x, y)
+            yield (x, y), self.parameters | self.sweep.varied(x, y), (source.load() for source in sources)
 
     def _indexed(self, given: dict[str, Any]) -> dict[tuple[str, Sample], Cell]:
         """Every cell of the experiment by the method and the sample that it is."""
         places = {
-            selection.format_selection(self.dataset.name, given | self._varied(x, y)): (x, y)
+            selection.format_selection(self.dataset.name, given | self.sweep.varied(x, y)): (x, y)
             for x, y in np.ndindex(*self.sweep.shape)
         }
         found = {}
@@ -220,7 +235,7 @@ class PhaseMap:
                 raise InputError(f"dataset '{self.dataset.name}' has no truth to tell success by")
             errors = camera_errors(store.estimate(cell.job.id).rotations, instance.truth, self.sweep.alignment)
             median = median_of_all(errors[np.isfinite(instance.truth).all(axis=(1, 2))])
-            met = self.sweep.success.met(median, instance, self.parameters | self._varied(*sample[:2]))
+            met = self.sweep.success.met(median, instance, self.parameters | self.sweep.varied(*sample[:2]))
             told = _Sampled(median, met, True)
         self.tallies[method].add(sample, told.success)
         self._samples[method].setdefault(sample[:2], []).append(told)
@@ -232,27 +247,9 @@ class PhaseMap:
         return self._last[1]
 
 
-def one_dataset(text: str, plugins: Sequence[Path]) -> tuple[Info, dict[str, Any]]:
-    """A dataset and the parameters given, from a selection that stands for one configuration.
-
-    Raises
-    ------
-    InputError
-        Where it stands for several, or for something unknown.
-    """
-    chosen = catalog("dataset", plugins).select([text])
-    if len(chosen) != 1:
-        raise InputError(f"a map is of one dataset, and '{text}' stands for {len(chosen)}")
-    return chosen[0]
-
-
 def _suite(sweep: Sweep, dataset: Info, given: dict[str, Any]) -> Suite:
     cells = tuple(
-        selection.format_selection(dataset.name, given | _varied(sweep, x, y)) for x, y in np.ndindex(*sweep.shape)
+        selection.format_selection(dataset.name, given | sweep.varied(x, y)) for x, y in np.ndindex(*sweep.shape)
     )
     title = f"{sweep.x.parameter} x {sweep.y.parameter}"
     return Suite("map", title, cells, sweep.methods, sweep.seeds)
-
-
-def _varied(sweep: Sweep, x: int, y: int) -> dict[str, Any]:
-    return {sweep.x.parameter: sweep.x.values[x], sweep.y.parameter: sweep.y.values[y]}

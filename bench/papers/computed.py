@@ -1,15 +1,59 @@
 """What has been computed for an item of a paper."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
 
+import numpy as np
+
+from bench.core import outcome
 from bench.core.errors import InputError
 from bench.core.problem import Instance
 from bench.plugins import selection
 from bench.plugins.catalog import catalog
+from bench.scoring.metrics.oracle import ORACLE, Curve
 from bench.scoring.results import Results
 from bench.suite.plan import Job
+
+
+@dataclass(frozen=True)
+class Score:
+    """A job, or the oracle's pick of it, as items read it; NaN where it has no such number.
+
+    Parameters
+    ----------
+    dataset, instance, method, seed
+        The job; dataset and method as selections.
+    status, oracle
+        How it ended, and whether this is the checkpoint that ground truth likes best.
+    notes
+        What the method said of it.
+    """
+
+    dataset: str
+    instance: str
+    method: str
+    seed: int = 0
+    status: str = outcome.OK
+    oracle: bool = False
+    mean_deg: float = np.nan
+    median_deg: float = np.nan
+    rms_deg: float = np.nan
+    solve_s: float = np.nan
+    iterations: float = np.nan
+    n_cameras: float = np.nan
+    n_scored: float = np.nan
+    edges_percent: float = np.nan
+    hardness: float = np.nan
+    notes: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether it ended well."""
+        return self.status == outcome.OK
+
+
+NUMBERS = [f.name for f in fields(Score) if f.type is float]
 
 
 @dataclass(frozen=True)
@@ -18,10 +62,12 @@ class Computed:
 
     Parameters
     ----------
-    jobs
+    alignment
+        The rule that removed the gauge.
+    jobs, scores
         Those of the item, and no others of the run's folder.
-    results
-        Their scores; None where there was nothing to run.
+    curves
+        For each method, as a selection, the errors along its checkpoints, where they were asked for.
     notes
         For each instance, what a reader must know of it.
     missing
@@ -30,25 +76,41 @@ class Computed:
         Reads the instance of a job.
     """
 
+    alignment: str
     jobs: Sequence[Job] = ()
-    results: Results | None = None
-    notes: Mapping[str, tuple[str, ...]] | None = None
-    missing: tuple[str, ...] = ()
+    scores: Sequence[Score] = ()
+    curves: Mapping[str, Sequence[Curve]] = field(default_factory=dict)
+    notes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    missing: Sequence[str] = ()
     instance: Callable[[Job], Instance] | None = None
+
+    def absences(self) -> Iterator[str]:
+        """A sentence for what is not on disk, as a note below a table."""
+        yield from (f"{sentence[0].upper()}{sentence[1:]}." for sentence in self.missing)
+
+
+def scores_of(results: Results, jobs: Sequence[Job]) -> Iterator[Score]:
+    """The rows of a scored run as objects, for each of these jobs; two may be one under different spellings."""
+    rows: dict[str, list[dict[Hashable, Any]]] = {}
+    for row in results.frame.to_dict("records"):
+        rows.setdefault(row["job"], []).append(row)
+    for job in jobs:
+        for row in rows[job.id]:
+            yield Score(
+                job.dataset,
+                job.instance,
+                spelled(job),
+                job.seed,
+                row["status"],
+                row["stop_reason"] == ORACLE,
+                notes=row["notes"],
+                **{name: np.nan if row[name] is None else float(row[name]) for name in NUMBERS},
+            )
 
 
 def one(kind: str, text: str) -> tuple[str, dict[str, Any]]:
-    """Name and given parameters of a selection that stands for one configuration.
-
-    Raises
-    ------
-    InputError
-        Where it stands for several, or for something unknown.
-    """
-    chosen = catalog(kind).select([text])
-    if len(chosen) != 1:
-        raise InputError(f"a layout names one {kind} at a time, and '{text}' stands for {len(chosen)}")
-    info, parameters = chosen[0]
+    """Name and given parameters of a selection that stands for one configuration."""
+    info, parameters = catalog(kind).one(text)
     return info.name, parameters
 
 
@@ -59,7 +121,7 @@ def label(kind: str, text: str) -> str:
 
 def spelled(job: Job) -> str:
     """The method of a job, as `label` spells it."""
-    return selection.format_selection(job.method, dict(job.parameters))
+    return selection.format_selection(job.method, job.parameters)
 
 
 def extended(text: str, parameters: Mapping[str, Any]) -> str:

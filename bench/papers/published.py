@@ -3,13 +3,31 @@
 import csv
 import io
 import math
+from dataclasses import dataclass
+from importlib import resources
 from importlib.resources.abc import Traversable
+from pathlib import Path
 
 from bench.core.errors import InputError, shown
 
 SCENE = "scene"
 FACTS = ("n_cameras", "edges_percent", "hardness")  # what a table prints of a scene, by the names that we score
 SOURCE = "source"
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Folders of numbers: those that papers have printed, and our own recorded runs."""
+
+    published: Traversable
+    reference: Traversable
+
+    @classmethod
+    def shipped(cls) -> "Sources":
+        """What comes with the project: in a checkout in ``results``, beside this bench; else inside the package."""
+        beside = Path(__file__).parents[2] / "results"
+        folders = ("published", "reference")
+        return cls(*(beside / name if beside.is_dir() else resources.files(f"bench.{name}") for name in folders))
 
 
 def read_published(folder: Traversable, name: str) -> list[dict[str, str]]:

@@ -56,6 +56,13 @@ class Catalog:
                 chosen.setdefault(selection.format_selection(info.name, parameters_of(configured)), (info, given))
         return list(chosen.values())
 
+    def one(self, text: str) -> tuple[Info, dict[str, Any]]:
+        """Resolve a selection that stands for one configuration; `InputError` where it stands for several."""
+        chosen = self.select([text])
+        if len(chosen) != 1:
+            raise InputError(f"'{text}' stands for {len(chosen)} configurations where one {self.kind} is taken")
+        return chosen[0]
+
 
 def catalog(kind: str, plugins: Sequence[str | Path] = ()) -> Catalog:
     """Find the plug-ins of one kind ("method" or "dataset").

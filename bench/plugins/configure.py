@@ -58,6 +58,12 @@ def parameters_of(configured: Any) -> dict[str, Any]:
     return {f.name: getattr(configured, f.name) for f in dataclasses.fields(configured)}
 
 
+def choices(cls: type, name: str) -> tuple[Any, ...]:
+    """The values that a parameter may take, where its annotation lists them; else none."""
+    hint = typing.get_type_hints(cls).get(name)
+    return typing.get_args(hint) if typing.get_origin(hint) is typing.Literal else ()
+
+
 def default_of(f: "dataclasses.Field[Any]") -> Any:
     """Default of a field; `dataclasses.MISSING` where it has none."""
     return f.default_factory() if f.default_factory is not dataclasses.MISSING else f.default

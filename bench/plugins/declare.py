@@ -12,6 +12,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from bench.core.problem import Estimate, Floats, Instance, Problem
+from bench.core.program import program
 from bench.plugins.configure import configured, default_of
 from bench.plugins.source_hash import hash_of_module
 
@@ -52,10 +53,14 @@ class Source:
 
 @dataclass(frozen=True)
 class Missing:
-    """An instance that is not on disk, with the command that gets it."""
+    """An instance that is not on disk, with the command that gets it, where that is not the dataset's ``fetch``."""
 
     name: str
-    command: str
+    command: str = ""
+
+    def how(self, dataset: str) -> str:
+        """The command that gets it, for an instance of this dataset."""
+        return self.command or f"{program()} data fetch {dataset}"
 
 
 class Dataset(Protocol):

@@ -15,15 +15,16 @@
 The file ``bench-style.toml`` of the working folder is in force wherever no other is named.
 """
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from bench.core import typed
 from bench.core.errors import InputError, suggestion
+from bench.formats import toml_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -127,28 +128,35 @@ def find(given: Path | None = None) -> tuple[Appearance, Path | None]:
     return (read(path), path) if path else (Appearance(), None)
 
 
+@dataclass(frozen=True)
+class _Style:
+    """A style file, as it is written."""
+
+    width: str | float | None = None
+    font: str = ""
+    font_size: float = Appearance.font_size
+    colors: tuple[str, ...] = ()
+    order: tuple[str, ...] = ()
+    methods: Mapping[str, MethodLook] = field(default_factory=dict)
+
+
 def read(path: Path) -> Appearance:
     """Read a style file; raises as `find`."""
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"style file {path} cannot be read: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"style file {path} is not TOML: {error}") from error
     where = f"style file {path}"
-    _known(content, ("width", "font", "font_size", "colors", "order", "methods"), where)
-    methods = content.get("methods", {})
-    _check(isinstance(methods, dict), where, "methods", "a table such as [methods.l1-irls]", methods)
-    font_size = content.get("font_size", Appearance.font_size)
-    _check(_is_number(font_size) and 3 <= font_size <= 30, where, "font_size", "from 3 to 30 points", font_size)
-    return Appearance(
-        _width(content.get("width"), where),
-        _font(content.get("font", ""), where),
-        float(font_size),
-        tuple(_color(color, where, "colors") for color in _texts(content, "colors", where)),
-        tuple(_texts(content, "order", where)),
-        {name: _method(value, f"{where}: methods.{name}") for name, value in methods.items()},
-    )
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{where} cannot be read: {error.strerror or error}") from error
+    found = typed.read(_Style, toml_file.parse(where, data), where)
+    fits = 3 <= found.font_size <= 30
+    _check(fits, where, "font_size", "from 3 to 30 points", found.font_size)
+    _check_font(found.font, where)
+    for color in found.colors:
+        _check_color(color, where, "colors")
+    for name, look in found.methods.items():
+        _check_look(look, f"{where}: methods.{name}")
+    width = _width(found.width, where)
+    return Appearance(width, found.font, found.font_size, found.colors, found.order, found.methods)
 
 
 def width_in(text: str) -> float:
@@ -160,77 +168,51 @@ def width_in(text: str) -> float:
         Where it is neither "single" nor "double" nor a number in range.
     """
     try:
-        value: Any = float(text)
+        value: str | float = float(text)
     except ValueError:
         value = text
     return _width(value, "--width") or 0.0
 
 
-def _width(value: Any, where: str) -> float | None:
+def _width(value: str | float | None, where: str) -> float | None:
     if value is None:
         return None
     if isinstance(value, str) and value in WIDTHS_IN:
         return WIDTHS_IN[value]
-    fits = _is_number(value) and NARROWEST_IN <= value <= WIDEST_IN
+    fits = not isinstance(value, str) and NARROWEST_IN <= value <= WIDEST_IN
     _check(fits, where, "width", f'"single", "double" or {NARROWEST_IN:g} to {WIDEST_IN:g} inches', value)
     return float(value)
 
 
-def _font(value: Any, where: str) -> str:
-    if value == "":
-        return ""
+def _check_font(font: str, where: str) -> None:
+    if not font:
+        return
     from matplotlib import font_manager
 
-    generic = ("serif", "sans-serif", "monospace", "cursive", "fantasy")
-    installed = font_manager.get_font_names()
-    known = value in generic or value in installed
-    near = suggestion(value, (*generic, *installed)) if isinstance(value, str) and not known else ""
-    _check(known, where, "font", f"an installed font{near if 'did you mean' in near else ''}", value)
-    return str(value)
+    known = ("serif", "sans-serif", "monospace", "cursive", "fantasy", *font_manager.get_font_names())
+    near = suggestion(font, known) if font not in known else ""
+    _check(font in known, where, "font", f"an installed font{near if 'did you mean' in near else ''}", font)
 
 
-def _method(content: Any, where: str) -> MethodLook:
-    _check(isinstance(content, dict), where, "", "a table", content)
-    _known(content, [f.name for f in fields(MethodLook)], where)
-    for key, value in content.items():
-        _check(isinstance(value, str), where, key, "text", value)
-    look = MethodLook(**content)
+def _check_look(look: MethodLook, where: str) -> None:
     if look.color:
-        _color(look.color, where, "color")
+        _check_color(look.color, where, "color")
     if look.marker or look.line:
         from matplotlib.lines import Line2D
 
         _check(look.marker in map(str, Line2D.markers), where, "marker", "one of matplotlib's markers", look.marker)
         _check(look.line in Line2D.lineStyles, where, "line", "one of matplotlib's line styles", look.line)
-    return look
 
 
-def _color(value: Any, where: str, key: str) -> str:
+def _check_color(value: str, where: str, key: str) -> None:
     from matplotlib.colors import is_color_like
 
-    _check(isinstance(value, str) and is_color_like(value), where, key, 'a colour such as "#0072B2"', value)
-    return str(value)
+    _check(is_color_like(value), where, key, 'a colour such as "#0072B2"', value)
 
 
-def _texts(content: Mapping[str, Any], key: str, where: str) -> list[str]:
-    value = content.get(key, [])
-    _check(isinstance(value, list) and all(isinstance(entry, str) for entry in value), where, key, "a list", value)
-    return list(value)
-
-
-def _known(content: Mapping[str, Any], keys: "tuple[str, ...] | list[str]", where: str) -> None:
-    for key in content:
-        if key not in keys:
-            raise InputError(f"{where}: unknown key '{key}'{suggestion(key, keys)}")
-
-
-def _check(fits: bool, where: str, key: str, wanted: str, value: Any) -> None:
+def _check(fits: bool, where: str, key: str, wanted: str, value: object) -> None:
     if not fits:
-        raise InputError(f"{where}{f': {key}' if key else ''} must be {wanted}, not {value!r}")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+        raise InputError(f"{where}: {key} must be {wanted}, not {value!r}")
 
 
 def _label(method: str, params: str) -> str:

@@ -186,7 +186,7 @@ def _source(job: Job, data_dir: Path | None, plugins: Sequence[Path]) -> tuple[S
     for found in configured.sources(data_dir, job.seed):
         if found.name == job.instance:
             if isinstance(found, Missing):
-                raise InputError(f"{job.dataset} {job.instance} is not on disk; get it with: {found.command}")
+                raise InputError(f"{job.dataset} {job.instance} is not on disk; get it with: {found.how(info.name)}")
             return found, instance_key(info, configured, found)
     raise InputError(f"{job.dataset} has no instance '{job.instance}' any more")
 

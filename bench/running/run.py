@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from bench.core import outcome
 from bench.core.errors import InputError
+from bench.core.program import program
 from bench.execution.supervise import Limits
 from bench.plugins.catalog import catalog
 from bench.plugins.selection import format_selection
@@ -173,7 +174,7 @@ class Run:
             if not (self.store.has_instance(key) if key in needed else self.store.problem_path(key).exists()):
                 tell(f"loading {cell.job.dataset} {cell.job.instance}")
                 self.store.add_instance(key, cell.source.load())
-        command = shlex.join(["python", "-m", "bench", *sys.argv[1:]])
+        command = f"{program()} {shlex.join(sys.argv[1:])}"
         jobs = tuple(cell.job for cell in self.cells)
         baseline = self.baseline if self.options.timing else ""
         self.store.add_plan(Plan(self.experiment.suite.name, jobs, self.experiment.missing, command, baseline))
@@ -208,7 +209,7 @@ def _resolved(
             raise InputError(f"--plugin {origin} is broken: {known_methods.broken[origin]}")
     plugged_in = [info.name for info in known_methods if info.origin in own]
     changes: dict[str, Any] = {
-        "methods": experiment.narrowed(suite.methods, methods) if methods else (*suite.methods, *plugged_in),
+        "methods": tuple(methods) or (*suite.methods, *plugged_in),
         "seeds": options.seeds,
         "rounds": options.rounds,
         **_limits(options),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow.compute as pc
 
+from bench.core.errors import InputError, suggestion
 from bench.core.problem import Floats
 from bench.plugins.selection import format_parameters, label, parse
 from bench.scoring.cache import Scores, scores_of
@@ -91,7 +92,10 @@ def score(
     jobs = newest(plans) if jobs is None else jobs
     scores = scores_of(store, jobs, rule)
     if protocol is not None:
-        fits = np.isin(scores.table["protocol"].to_numpy(), [protocol, "all"])
+        found = scores.table["protocol"].to_numpy()
+        fits = np.isin(found, [protocol, "all"])
+        if not fits.any():
+            raise InputError(f"no instance of this run has the protocol '{protocol}'{suggestion(protocol, set(found))}")
         jobs, scores = list(itertools.compress(jobs, fits)), scores.where(fits)
     frame = _frame(jobs, scores.table, rule)
     errors = CameraErrors(frame, scores)

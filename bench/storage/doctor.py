@@ -7,6 +7,7 @@ from pathlib import Path
 
 from bench.core import outcome
 from bench.core.errors import InputError, described
+from bench.core.program import program
 from bench.storage.store import ASIDE, Store
 from bench.suite.plan import Job, Plan, decode, encode
 
@@ -58,7 +59,7 @@ def repair(folder: Path, findings: list[Finding]) -> None:
         elif finding.remedy == "plan":
             adopted.append(_job(store, finding.path.stem))
     if adopted:
-        store.add_plan(Plan("recovered", tuple(adopted), command="python -m bench doctor --repair"))
+        store.add_plan(Plan("recovered", tuple(adopted), command=f"{program()} doctor --repair"))
 
 
 def _plans(store: Store) -> Iterator[Finding]:

@@ -31,6 +31,7 @@ import numpy as np
 
 from bench.core.errors import InputError, described, shown
 from bench.core.problem import Estimate, Instance
+from bench.core.program import program
 from bench.formats import archive
 from bench.storage import migration
 from bench.storage.arrays import load_estimate, load_problem, save_problem
@@ -67,7 +68,7 @@ class Store:
             Where the folder holds no run, or one of a newer version.
         """
         if not (folder / "plans").is_dir():
-            raise InputError(f"{folder} is not the folder of a run; make one with: python -m bench run --out {folder}")
+            raise InputError(f"{folder} is not the folder of a run; make one with: {program()} run --out {folder}")
         migration.migrate(folder)
         return cls(folder)
 
@@ -95,7 +96,7 @@ class Store:
 
     def plan(self, path: Path) -> Plan:
         """Read one plan; raises `InputError` where that fails."""
-        with _reading(path, f"see: python -m bench doctor {self.folder} --repair"):
+        with _reading(path, f"see: {program()} doctor {self.folder} --repair"):
             return decode(_read_json(path))
 
     def jobs(self) -> list[Job]:
@@ -143,7 +144,7 @@ class Store:
     def instance(self, key: str) -> Instance:
         """Read an instance back; raises `InputError` where that fails."""
         folder = self.folder / "instances" / key
-        with _reading(folder, f"run the same command again, or see: python -m bench doctor {self.folder} --repair"):
+        with _reading(folder, f"run the same command again, or see: {program()} doctor {self.folder} --repair"):
             problem = load_problem(folder / "problem.npz")
             hidden = archive.load(folder / "truth.npz", ("truth", "outliers"))
             shapes = {"truth": (problem.n, 3, 3), "outliers": (problem.m,)}

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bench.core import typed
 from bench.core.errors import InputError, shown, suggestion
 from bench.formats import toml_file
 from bench.plugins import selection
@@ -55,7 +56,10 @@ class Suite:
     budget: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse numbers that no run can have."""
+        """Refuse what no run can have."""
+        for key in ("datasets", "methods"):
+            if not getattr(self, key):
+                raise InputError(f"'{key}' names nothing; write selections, such as ['name[parameter=1]']")
         for key in ("seeds", "rounds"):
             if not 1 <= getattr(self, key) <= _MOST_REPEATS:
                 raise InputError(f"'{key}' is {getattr(self, key)}, not from 1 to {_MOST_REPEATS}")
@@ -96,52 +100,30 @@ def load_suite(name: str) -> Suite:
         Where there is no such suite, or the file is not one.
     """
     stem, content = toml_file.read("suite", SUITES, name)
-    return _checked_suite(stem, f"suite {name}", content)
-
-
-_FIELDS: dict[str, tuple[type, ...]] = {
-    "title": (str,),
-    "datasets": (list,),
-    "methods": (list,),
-    "seeds": (int,),
-    "timeout_s": (int, float),
-    "memory_gib": (int, float),
-    "rounds": (int,),
-    "baseline": (str,),
-    "budget": (str,),
-}
-
-
-def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
-    for key, value in content.items():
-        if key not in _FIELDS:
-            raise InputError(f"{where}: unknown key {shown(key)}{suggestion(key, _FIELDS)}")
-        if not isinstance(value, _FIELDS[key]) or isinstance(value, bool):
-            raise InputError(f"{where}: '{key}' must be a {_FIELDS[key][0].__name__}, not {shown(value)}")
-    for key in ("datasets", "methods"):
-        if not content.get(key) or not all(isinstance(text, str) for text in content[key]):
-            raise InputError(f"{where}: '{key}' must be a list of selections, such as {key} = ['name[parameter=1]']")
-        content[key] = tuple(content[key])
-    if "baseline" in content and content["baseline"] not in content["methods"]:
-        guess = suggestion(content["baseline"], content["methods"])
-        raise InputError(f"{where}: the baseline {shown(content['baseline'])} is not one of its methods{guess}")
-    if "budget" in content:
+    where = f"suite {name}"
+    if "name" in content:
+        raise InputError(f"{where}: unknown key 'name'; a suite is called as its file is")
+    suite = typed.read(Suite, {"name": stem, "title": stem, **content}, where)
+    if suite.baseline and suite.baseline not in suite.methods:
+        guess = suggestion(suite.baseline, suite.methods)
+        raise InputError(f"{where}: the baseline {shown(suite.baseline)} is not one of its methods{guess}")
+    if suite.budget:
         if clash := [key for key in ("timeout_s", "memory_gib") if key in content]:
             raise InputError(f"{where}: 'budget' stands for '{clash[0]}' too; keep one of them")
-        limits = budget.parse(content["budget"])
-        content |= {"timeout_s": limits.seconds, "memory_gib": limits.memory_gib}
-    try:
-        return Suite(name, content.pop("title", name), **content)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        limits = budget.parse(suite.budget)
+        suite = replace(suite, timeout_s=limits.seconds, memory_gib=limits.memory_gib)
+    return suite
 
 
-def narrowed(suite_selections: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
-    """Apply ``-m`` or ``-d`` to a suite's list; a bare name stands for the configurations of it that the suite has."""
+def narrowed(datasets: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
+    """Choose among the datasets of a suite: a bare name keeps the problems of it that the suite has, if it has any.
+
+    So of methods it would not be: there a bare name is the default configuration, and two of one method are two rivals.
+    """
     out: list[str] = []
     for text in wanted:
         parsed = selection.parse(text)
-        same_name = [s for s in suite_selections if selection.parse(s).name == parsed.name]
+        same_name = [s for s in datasets if selection.parse(s).name == parsed.name]
         out += same_name if same_name and not parsed.grid else [text]
     return tuple(out)
 
@@ -174,7 +156,7 @@ def resolve(
         for seed in range(suite.seeds):
             for source in configured.sources(data_dir, seed):
                 if isinstance(source, Missing):
-                    names = missing.setdefault((info.name, source.command), [])
+                    names = missing.setdefault((info.name, source.how(info.name)), [])
                     names += [source.name] if source.name not in names else []
                 elif source.seeded or seed == 0:
                     cells += _cells_of(source, info, configured, label, seed, suite.seeds, chosen, rounds)

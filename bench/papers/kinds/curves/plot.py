@@ -1,14 +1,15 @@
-"""A figure of errors on simulated problems against one of their parameters, with panels for another."""
+"""What a layout says of a figure of curves, and its points."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from bench.core import outcome
 from bench.core.problem import Floats
-from bench.papers.computed import Computed, extended, label, one, spelled
+from bench.papers.computed import Computed, extended, label, one
+from bench.papers.item import Comparison
+from bench.papers.published import Sources
 from bench.plugins.catalog import catalog
 from bench.scoring.inference.statistics import seed_half_width
 from bench.scoring.metrics.theory import cramer_rao_rms_deg
@@ -17,6 +18,9 @@ from bench.suite.plan import Job
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
+
+    from bench.reporting.tables.grid import Grid
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,8 @@ class CurvePlot:
     timeout_s: float = 600.0
     memory_gib: float = 8.0
 
+    needs: ClassVar[Collection[str]] = ()
+
     def suites(self, name: str) -> tuple[Suite, ...]:
         """What has to run: a suite for each variant of the dataset."""
         methods: dict[tuple[str, ...], list[str]] = {}
@@ -92,54 +98,28 @@ class CurvePlot:
             for datasets, texts in methods.items()
         )
 
-    def points(self, computed: Computed) -> "pd.DataFrame":
-        """What the figure shows, one row for each point.
+    def compare(self, sources: Sources, computed: Computed) -> "Curves":
+        """The points of every curve; nothing is published in numbers."""
+        points = tuple(
+            self._point(curve, panel, x, label("dataset", text), computed)
+            for curve in self.curves
+            for panel, x, text in self._problems(curve)
+        )
+        return Curves(self, points, computed)
 
-        Returns
-        -------
-        DataFrame
-            The panel's and the axis' parameter, ``curve, method, dataset, seeds, ok`` (how many seeds there were and
-            how many ended well), the statistic's mean over these (of ``rms_deg``: the root of the mean square),
-            ``half_width_deg`` of its 95 % t interval and ``scored_percent`` of the cameras: fewer than all where a
-            graph is not connected.
-        """
-        import pandas as pd
-
-        assert computed.results is not None  # simulated data are never missing
-        scores = computed.results.frame.set_index("job")
-        by_dataset: dict[str, list[Job]] = {}
-        for job in computed.jobs:
-            by_dataset.setdefault(job.dataset, []).append(job)
-        rows = []
-        for curve in self.curves:
-            method = label("method", curve.method) if curve.method else ""
-            for panel, x, text in self._problems(curve):
-                dataset = label("dataset", text)
-                jobs = by_dataset[dataset]
-                if method:
-                    found = scores.loc[[job.id for job in jobs if spelled(job) == method]]
-                    well = found[found["status"] == outcome.OK]
-                    errors = well[self.statistic].to_numpy(dtype=float)
-                    seeds, scored = len(found), 100 * well["n_scored"].sum() / max(1, well["n_cameras"].sum())
-                else:
-                    errors = _bounds(jobs, computed)
-                    seeds, scored = len(errors), 100.0
-                mean, half_width = _averaged(errors, self.statistic)
-                rows.append(
-                    {
-                        self.panel.parameter: panel,
-                        self.axis.parameter: x,
-                        "curve": curve.label,
-                        "method": method,
-                        "dataset": dataset,
-                        "seeds": seeds,
-                        "ok": len(errors),
-                        self.statistic: mean,
-                        "half_width_deg": half_width,
-                        "scored_percent": scored,
-                    }
-                )
-        return pd.DataFrame(rows)
+    def _point(self, curve: Curve, panel: int | float, x: int | float, dataset: str, computed: Computed) -> "Point":
+        method = label("method", curve.method) if curve.method else ""
+        if method:
+            found = [score for score in computed.scores if (score.dataset, score.method) == (dataset, method)]
+            well = [score for score in found if score.ok]
+            errors = np.array([getattr(score, self.statistic) for score in well], dtype=float)
+            cameras = sum(score.n_cameras for score in well)
+            seeds, scored = len(found), 100 * sum(score.n_scored for score in well) / max(1, cameras)
+        else:
+            errors = _bounds([job for job in computed.jobs if job.dataset == dataset], computed)
+            seeds, scored = len(errors), 100.0
+        mean, half_width = _averaged(errors, self.statistic)
+        return Point(panel, x, curve.label, method, dataset, seeds, len(errors), mean, half_width, scored)
 
     def _problems(self, curve: Curve) -> Iterator[tuple[int | float, int | float, str]]:
         """Panel, place on the axis, and the selection of the dataset there."""
@@ -147,6 +127,61 @@ class CurvePlot:
             for x in self.axis.values:
                 varied = {self.panel.parameter: panel, self.axis.parameter: x}
                 yield panel, x, extended(self.dataset, {**varied, **curve.dataset})
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of a curve.
+
+    Parameters
+    ----------
+    panel, x
+        The panel's and the axis' parameter.
+    seeds, ok
+        How many there were, and how many ended well.
+    error_deg, half_width_deg
+        The statistic's mean over these (of ``rms_deg``: the root of the mean square), and of its 95 % t interval.
+    scored_percent
+        Of the cameras: fewer than all where a graph is not connected.
+    """
+
+    panel: int | float
+    x: int | float
+    curve: str
+    method: str
+    dataset: str
+    seeds: int
+    ok: int
+    error_deg: float
+    half_width_deg: float
+    scored_percent: float
+
+
+@dataclass(frozen=True)
+class Curves(Comparison):
+    """The figure, computed."""
+
+    plot: CurvePlot
+    rows: tuple[Point, ...]
+    computed: Computed
+
+    def frame(self) -> "pd.DataFrame":
+        """A row for each `Point`; the columns of the two parameters and of the statistic bear their names."""
+        plot = self.plot
+        names = {"panel": plot.panel.parameter, "x": plot.axis.parameter, "error_deg": plot.statistic}
+        return super().frame().rename(columns=names)
+
+    def grid(self) -> "Grid":
+        """A row for each panel and place on the axis, a column for each curve."""
+        from bench.papers.kinds.curves.grid import point_grid
+
+        return point_grid(self)
+
+    def figure(self) -> "Figure":
+        """Curves with their bands; the vertical axis is logarithmic."""
+        from bench.papers.kinds.curves.figure import draw
+
+        return draw(self)
 
 
 def _bounds(jobs: Sequence[Job], computed: Computed) -> Floats:

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from bench.papers.items.curves import CurvePlot
+from bench.papers.kinds.curves.grid import notes
+from bench.papers.kinds.curves.plot import CurvePlot, Curves, Point
 from bench.reporting.figures.style import COLORS, LINES, Look, describe, log_axis, panels, styled
 
 REFERENCE = "#000000"
@@ -17,25 +17,27 @@ WIDEST, THINNEST = 3.8, 0.9  # points; curves that coincide show as nested bands
 REFERENCE_WIDTH = 0.9
 
 
-def draw(plot: CurvePlot, points: pd.DataFrame, alignment: str, notes: tuple[str, ...]) -> Figure:
-    """Draw the points of a figure, see `CurvePlot.points`; the vertical axis is logarithmic."""
+def draw(found: Curves) -> Figure:
+    """Draw the points of a figure; the vertical axis is logarithmic."""
+    plot = found.plot
     looks = _looks(plot)
-    low = points[plot.statistic].min() / 1.6
-    high = (points[plot.statistic] + points["half_width_deg"].fillna(0)).max() * 1.2
+    low = float(np.nanmin([point.error_deg for point in found.rows])) / 1.6
+    high = float(np.nanmax([point.error_deg + np.nan_to_num(point.half_width_deg) for point in found.rows])) * 1.2
     with styled():
         handles = [_line(look, width, [], []) for look, width in looks.values()]
         figure, axes = panels(len(plot.panel.values), 2.9, 2.7, handles)
         for ax, panel in zip(axes, plot.panel.values, strict=True):
             ax.set_title(plot.panel.label.format(panel), loc="left")
             for curve, (look, width) in looks.items():
-                own = points[(points[plot.panel.parameter] == panel) & (points["curve"] == curve)]
-                _curve(ax, own, plot, look, width, low)
+                own = [point for point in found.rows if (point.panel, point.curve) == (panel, curve)]
+                _curve(ax, own, look, width, low)
             ax.set_xlabel(plot.axis.label)
         axes[0].set(yscale="log", ylim=(low, high))
         axes[0].set_ylabel(f"{plot.statistic.removesuffix('_deg')} error (°)")
         for ax in axes:
             log_axis(ax.yaxis, low, high, TICKS)
-        describe(figure, plot.title, " ".join([f"{plot.dataset}, {alignment} alignment.", *notes]))
+        caption = f"{plot.dataset}, {found.computed.alignment} alignment."
+        describe(figure, plot.title, " ".join([caption, *notes(found)]))
     return figure
 
 
@@ -53,9 +55,9 @@ def _looks(plot: CurvePlot) -> dict[str, tuple[Look, float]]:
     return looks
 
 
-def _curve(ax: Axes, own: pd.DataFrame, plot: CurvePlot, look: Look, width: float, low: float) -> None:
-    x, mean = own[plot.axis.parameter].to_numpy(), own[plot.statistic].to_numpy()
-    half = own["half_width_deg"].fillna(0).to_numpy()
+def _curve(ax: Axes, own: Sequence[Point], look: Look, width: float, low: float) -> None:
+    x, mean = np.array([point.x for point in own]), np.array([point.error_deg for point in own])
+    half = np.nan_to_num([point.half_width_deg for point in own])
     ax.fill_between(x, np.maximum(mean - half, low / 10), mean + half, color=look.color, alpha=0.2, linewidth=0)
     ax.add_line(_line(look, width, x.tolist(), mean.tolist()))
     ax.autoscale_view(scaley=False)

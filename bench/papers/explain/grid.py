@@ -2,22 +2,26 @@
 
 import math
 
-from bench.papers.explain import Explained
+from bench.papers.explain.switches import Explained
 from bench.reporting.tables.grid import ABSENT, Cell, Grid, abbreviated
 
 
-def explained_grid(explained: Explained, alignment: str) -> Grid:
+def explained_grid(explained: Explained) -> Grid:
     """A row for each switch, those that come closest first; the closest is bold where it helps."""
-    rows = explained.rows.sort_values("gap_after", kind="stable")
-    closest = rows["gap_after"].min()
+
+    def gap(value: float) -> float:
+        return value if math.isfinite(value) else math.inf
+
+    rows = sorted(explained.rows, key=lambda row: gap(row.gap_after))
+    closest = min((gap(row.gap_after) for row in rows), default=math.inf)
     return Grid(
-        caption=f"{explained.scene} / {explained.column}: measured {explained.measured:.3f} ({alignment} alignment), "
-        f"published {explained.published}; every row changes one thing",
+        caption=f"{explained.scene} / {explained.column}: measured {explained.measured:.3f} "
+        f"({explained.alignment} alignment), published {explained.published}; every row changes one thing",
         facts=("switch", "from", "to"),
         methods=(("measured", ""), ("gap before", ""), ("gap after", ""), ("change", "")),
         rows=tuple(
             (
-                (str(row.switch), str(row.before), str(row.after)),
+                (row.switch, row.before, row.after),
                 (
                     Cell(
                         _number(row.measured) if math.isfinite(row.measured) else abbreviated(row.status),
@@ -28,7 +32,7 @@ def explained_grid(explained: Explained, alignment: str) -> Grid:
                     Cell(_number(row.gap_after - row.gap_before, "+")),
                 ),
             )
-            for row in rows.itertuples()
+            for row in rows
         ),
         notes=(explained.sentence(),),
     )

@@ -1,0 +1,1 @@
+"""Why a measured number is not the published one: every choice toggled, one at a time."""

@@ -1,0 +1,75 @@
+"""What every item of a paper can do, whatever its kind."""
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+from bench.papers.computed import Computed
+from bench.papers.published import Sources
+from bench.suite.experiment import Suite
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from bench.reporting.tables.grid import Grid
+
+
+class Comparison(ABC):
+    """An item made again: what is measured beside what is published."""
+
+    rows: Sequence[Any]  # instances of one dataclass
+
+    def frame(self) -> "pd.DataFrame":
+        """Every number, unrounded: a row for each of the rows, a column for each of their fields."""
+        import pandas as pd
+
+        return pd.DataFrame([dataclasses.asdict(row) for row in self.rows])
+
+    @abstractmethod
+    def grid(self) -> "Grid":
+        """The same as a table."""
+
+    def printed(self) -> "Grid":
+        """The table in the form of the paper, where that is another."""
+        return self.grid()
+
+    def figure(self) -> "Figure | None":
+        """The same as a figure, where the item is one."""
+        return None
+
+    def text(self, style: str, *, width: int = 100, terminal: bool = False) -> tuple[str, tuple[str, ...]]:
+        """The table in a format, and the notes that are not in it; see `bench.reporting.tables.text.text_of`."""
+        from bench.reporting.tables.text import text_of
+
+        grid = self.printed() if style == "latex" else self.grid()
+        return text_of(grid, self.frame(), style, width=width, terminal=terminal)
+
+
+class Item(Protocol):
+    """A table, figure or claim, as a layout describes it: a frozen dataclass of its keys."""
+
+    @property
+    def title(self) -> str:
+        """What it is, in the paper's words."""
+
+    @property
+    def alignment(self) -> str:
+        """The rule that removes the gauge; "" where nothing is scored."""
+
+    @property
+    def needs(self) -> Collection[str]:
+        """What has to be scored besides estimates: ``oracle``, ``checkpoints``."""
+
+    def suites(self, name: str) -> Sequence[Suite]:
+        """What has to run, in suites of this name."""
+
+    def compare(self, sources: Sources, computed: Computed) -> Comparison:
+        """Put what was computed beside what is published.
+
+        Raises
+        ------
+        InputError
+            Where the layout and the published numbers do not fit together.
+        """

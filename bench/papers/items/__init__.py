@@ -1,1 +1,0 @@
-"""The kinds of table, figure and claim that a paper's layout may name."""

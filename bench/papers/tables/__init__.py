@@ -1,1 +1,0 @@
-"""Measured beside published, cell by cell."""
