@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from appearances import using
 
 from bench.papers.computed import Computed
 from bench.papers.items.claims import Claims
@@ -20,10 +21,11 @@ from bench.papers.layout import load_layout
 from bench.papers.published import read_published
 from bench.papers.tables import claims, paper
 from bench.papers.tables.side_by_side import side_by_side
-from bench.reporting.appearance import Appearance, using
+from bench.reporting.appearance import Appearance
 from bench.reporting.figures import style
 from bench.reporting.figures.captions import captions
-from bench.reporting.figures.plots import figures
+from bench.reporting.figures.paint_matplotlib import paint
+from bench.reporting.present import drawings
 from bench.reporting.tables.grid import Grid, grids
 from bench.reporting.tables.latex import latex, latex_escape
 from bench.scoring.metrics.errors import summary
@@ -63,7 +65,14 @@ def scored(instances: int, methods: list[tuple[str, str, str]] = METHODS, **more
             errors = np.random.default_rng([k, m]).gamma(2, 1 + m, 30)
             row = {"dataset": "1dsfm", "instance": f"A_scene_{k}", "instance_key": str(k), "method": method}
             row |= {"title": title, "params": params, "seed": 0, "protocol": "truth-subgraph", "alignment": "l1"}
-            row |= {"status": "ok", "solve_s": 0.25 * (m + 1), "peak_mib": 1.5, "n_cameras": 30, "n_solved": 30}
+            row |= {
+                "outcome": "ok",
+                "status": "ok",
+                "solve_s": 0.25 * (m + 1),
+                "peak_mib": 1.5,
+                "n_cameras": 30,
+                "n_solved": 30,
+            }
             row |= {"edges_percent": 61.5, "hardness": 0.01, "notes": ""}
             rows.append(row | summary(errors) | more)
     return pd.DataFrame(rows)
@@ -74,7 +83,14 @@ def measured(table: SceneTable) -> Computed:
     rows = []
     for instance in ("Ellis_Island", "Madrid_Metropolis"):
         for method, params, median in (("dmf-synch", "loss=l1", 0.8), ("dmf-synch", "", 0.5), ("l1-irls", "", 2.0)):
-            row = {"instance": instance, "method": method, "params": params, "status": "ok", "median_deg": median}
+            row = {
+                "instance": instance,
+                "method": method,
+                "params": params,
+                "outcome": "ok",
+                "status": "ok",
+                "median_deg": median,
+            }
             rows.append(row | {"n_cameras": 176, "edges_percent": 68.1, "hardness": 0.0319, "notes": "50 % of $x_1$"})
     results = Results(pd.DataFrame(rows), {}, {}, (), "l1", {})
     return Computed((), results, {"Madrid_Metropolis": ("fewer cameras & an easier subset",)}, ("get Alamo: --fetch",))
@@ -167,7 +183,8 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     for width, inches in (("single", 3.5), ("double", 7.16)):
         folders[width] = tmp_path_factory.mktemp(width)
         with using(Appearance(width_in=inches)):
-            found = figures(frame, errors)
+            drawn = drawings(Results(frame, errors, {}, (), "l1", {}))
+            found = {name: paint(drawing) for name, drawing in drawn.items()}
             for name, figure in found.items():
                 style.save(figure, folders[width], name, ("pdf",))
             (folders[width] / "captions.tex").write_text(captions(found), encoding="utf-8")

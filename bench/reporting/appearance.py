@@ -16,14 +16,14 @@ The file ``bench-style.toml`` of the working folder is in force wherever no othe
 """
 
 import tomllib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.core.errors import InputError, suggestion
+from bench.plugins.selection import label
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,11 +70,11 @@ class Appearance:
 
     def of(self, method: str, params: str) -> MethodLook:
         """What is given for a configured method."""
-        return self.methods.get(_label(method, params)) or self.methods.get(method, MethodLook())
+        return self.methods.get(label(method, params)) or self.methods.get(method, MethodLook())
 
     def head(self, method: str, params: str, title: str) -> tuple[str, str]:
         """Title and parameters as shown: a name given to a configured method stands for its parameters too."""
-        if params and (own := self.methods.get(_label(method, params))) and own.name:
+        if params and (own := self.methods.get(label(method, params))) and own.name:
             return own.name, ""
         return self.of(method, params).name or title, params
 
@@ -85,7 +85,7 @@ class Appearance:
         place = {name: k for k, name in enumerate(self.order)}
         last = len(self.order)
         keys = [
-            place.get(_label(m, p), place.get(m, last)) for m, p in zip(frame["method"], frame["params"], strict=True)
+            place.get(label(m, p), place.get(m, last)) for m, p in zip(frame["method"], frame["params"], strict=True)
         ]
         scenes = frame.groupby(["dataset", "instance", "protocol"], sort=False, dropna=False).ngroup()
         order = sorted(range(len(frame)), key=lambda k: (scenes.iloc[k], keys[k]))
@@ -103,16 +103,6 @@ def current() -> Appearance:
 def put_in_force(appearance: Appearance) -> None:
     """Have everything that this process draws look so."""
     _IN_FORCE.set(appearance)
-
-
-@contextmanager
-def using(appearance: Appearance) -> Iterator[None]:
-    """Put an appearance in force for a while."""
-    token = _IN_FORCE.set(appearance)
-    try:
-        yield
-    finally:
-        _IN_FORCE.reset(token)
 
 
 def find(given: Path | None = None) -> tuple[Appearance, Path | None]:
@@ -231,7 +221,3 @@ def _check(fits: bool, where: str, key: str, wanted: str, value: Any) -> None:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _label(method: str, params: str) -> str:
-    return f"{method}[{params}]" if params else method

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from bench.core.problem import Floats, Ints, Problem
+from bench.reporting.figures.paint_plotly import FigureDict
 from bench.reporting.html.case import Solved
-from bench.reporting.html.section import FigureDict
 from bench.scoring.metrics.folds import Fold
 
 GRID = 1000
@@ -41,10 +41,10 @@ def layout(problem: Problem) -> Ints:
     for step in np.geomspace(1.0, 0.02, STEPS):
         near = KDTree(positions).query_pairs(REACH, output_type="ndarray").T
         moves = np.zeros((n, 2))
-        for (i, j), push in ((near, lambda d: 1 / d), (ends, lambda d: -pull * d)):
+        for (i, j), pushes in ((near, True), (ends, False)):
             apart = positions[i] - positions[j]
             distance = np.maximum(np.linalg.norm(apart, axis=1, keepdims=True), 1e-3)
-            force = apart / distance * push(distance)
+            force = apart / distance * (1 / distance if pushes else -pull * distance)
             for k in range(2):
                 moves[:, k] += np.bincount(i, force[:, k], n) - np.bincount(j, force[:, k], n)
         length = np.linalg.norm(moves, axis=1, keepdims=True)
