@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from appearances import using
 from commands import bench
 
 from bench.core.errors import InputError
 from bench.reporting import appearance
-from bench.reporting.appearance import Appearance, MethodLook, find, read, using
+from bench.reporting.appearance import Appearance, MethodLook, find, read
 from bench.reporting.figures import style
+from bench.reporting.figures.looks import looks
 from bench.reporting.tables.grid import grids
 from bench.scoring.metrics.errors import summary
 
@@ -38,7 +40,15 @@ def frame() -> pd.DataFrame:
     for instance in ("s", "t"):
         for method, params in (("a", ""), ("a", "k=1"), ("b", "k=2"), ("b", "")):
             row = {"dataset": "d", "instance": instance, "instance_key": instance, "protocol": "all", "alignment": "l1"}
-            row |= {"method": method, "title": method.upper(), "params": params, "seed": 0, "status": "ok", "notes": ""}
+            row |= {
+                "method": method,
+                "title": method.upper(),
+                "params": params,
+                "seed": 0,
+                "outcome": "ok",
+                "status": "ok",
+                "notes": "",
+            }
             row |= {"n_cameras": 9, "n_solved": 9, "solve_s": 1.0, "peak_mib": 1.0}
             rows.append(row | summary(np.arange(1.0, 10)))
     return pd.DataFrame(rows)
@@ -69,16 +79,16 @@ def test_tables_and_figures_follow_it(file: Path, frame: pd.DataFrame) -> None:
     with using(read(file)):
         ordered = appearance.current().ordered(frame)
         (grid,) = grids(ordered, {})
-        looks = style.looks(ordered)
+        shown = looks(ordered)
         with style.styled():
             figure, _ = style.panels(1, 2.0, 2.0, ())
     assert grid.methods == (("Second", ""), ("First", ""), ("First", "k=1"), ("B", ""))
     assert [facts[0] for facts, _ in grid.rows] == ["s", "t"]
-    assert looks["b", "k=2"].color == "red"
-    assert looks["b", "k=2"].line == ":"
-    assert (looks["a", ""].label, looks["a", ""].marker, looks["a", ""].color) == ("First", "s", "#222222")
+    assert shown["b", "k=2"].color == "red"
+    assert shown["b", "k=2"].line == ":"
+    assert (shown["a", ""].label, shown["a", ""].marker, shown["a", ""].color) == ("First", "s", "#222222")
     assert figure.get_figwidth() == 7.16
-    assert style.looks(frame)["a", ""].label == "A"  # no longer in force
+    assert looks(frame)["a", ""].label == "A"  # no longer in force
 
 
 @pytest.mark.parametrize(

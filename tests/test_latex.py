@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from appearances import using
 
 from bench.papers.computed import Computed, Score
 from bench.papers.kinds.claims.statements import Claims, Verdict, Verdicts
@@ -17,13 +18,15 @@ from bench.papers.kinds.properties import PropertyTable
 from bench.papers.kinds.scenes.table import SceneTable
 from bench.papers.kinds.speedup import Ratio, Side, Speedup
 from bench.papers.layout import load_layout
-from bench.reporting.appearance import Appearance, using
+from bench.reporting.appearance import Appearance
 from bench.reporting.figures import style
 from bench.reporting.figures.captions import captions
-from bench.reporting.figures.plots import figures
+from bench.reporting.figures.paint_matplotlib import paint
+from bench.reporting.present import drawings
 from bench.reporting.tables.grid import Grid, grids
 from bench.reporting.tables.latex import latex, latex_escape
 from bench.scoring.metrics.errors import summary
+from bench.scoring.results import Results
 
 DOCUMENT = r"""\documentclass[10pt,twocolumn,letterpaper]{article}
 \usepackage[margin=0.67in]{geometry}
@@ -59,7 +62,14 @@ def scored(instances: int, methods: list[tuple[str, str, str]] = METHODS, **more
             errors = np.random.default_rng([k, m]).gamma(2, 1 + m, 30)
             row = {"dataset": "1dsfm", "instance": f"A_scene_{k}", "instance_key": str(k), "method": method}
             row |= {"title": title, "params": params, "seed": 0, "protocol": "truth-subgraph", "alignment": "l1"}
-            row |= {"status": "ok", "solve_s": 0.25 * (m + 1), "peak_mib": 1.5, "n_cameras": 30, "n_solved": 30}
+            row |= {
+                "outcome": "ok",
+                "status": "ok",
+                "solve_s": 0.25 * (m + 1),
+                "peak_mib": 1.5,
+                "n_cameras": 30,
+                "n_solved": 30,
+            }
             row |= {"edges_percent": 61.5, "hardness": 0.01, "notes": ""}
             rows.append(row | summary(errors) | more)
     return pd.DataFrame(rows)
@@ -170,7 +180,8 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     for width, inches in (("single", 3.5), ("double", 7.16)):
         folders[width] = tmp_path_factory.mktemp(width)
         with using(Appearance(width_in=inches)):
-            found = figures(frame, errors)
+            drawn = drawings(Results(frame, errors, {}, (), "l1", {}))
+            found = {name: paint(drawing) for name, drawing in drawn.items()}
             for name, figure in found.items():
                 style.save(figure, folders[width], name, ("pdf",))
             (folders[width] / "captions.tex").write_text(captions(found), encoding="utf-8")

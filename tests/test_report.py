@@ -6,15 +6,14 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from bench.reporting.html import figures, ranks, reversals, words
+from bench.reporting.html import reversals, words
 from bench.reporting.html.embed import compact
 from bench.reporting.html.leaderboard import ALL_SCENES, leaderboard
 from bench.reporting.html.page import render, write_report
 from bench.reporting.html.realign import under_every_rule
 from bench.reporting.html.section import anchor
-from bench.reporting.html.standing import standings
-from bench.reporting.tables.rows import Entry, Scene, Value
-from bench.reporting.tables.rows import scenes as scenes_of
+from bench.reporting.tables.rows import Entry, Failed, Scene, Value
+from bench.reporting.tables.standing import standings
 from bench.scoring.results import score
 from tests.commands import bench
 from tests.runs import Made, made_run
@@ -26,7 +25,7 @@ def entry(name, median=1.0, *, seconds=1.0, best=False, ok=1, seeds=1, status="t
     values = {"median_deg": Value(median), "mean_deg": Value(2 * median), "solve_s": Value(seconds)}
     if not ok:
         values = dict.fromkeys(values, Value(float("nan")))
-    failed = {status: seeds - ok} if ok < seeds else {}
+    failed = (Failed(status.partition("(")[0], status, seeds - ok),) if ok < seeds else ()
     return Entry(name, name, "", values, scored * bool(ok), scored * bool(ok), seeds, ok, failed, (), best)
 
 
@@ -35,7 +34,7 @@ def scene(name, *entries, alignment="l1", protocol="all"):
 
 
 def found(*scenes):
-    return " ".join(words.summary(scenes, standings(scenes)))
+    return " ".join(words.summary(scenes, standings(scenes, {})))
 
 
 class TestWords:
@@ -143,21 +142,19 @@ class TestDependence:
 
 
 class TestStanding:
-    def test_failures_rank_last_and_have_no_mean(self):
+    def test_failures_have_no_mean_and_unranked_methods_come_last(self):
         scenes = [scene("P", entry("a", 1), entry("b", 2)), scene("Q", entry("a", ok=0), entry("b", 4))]
-        first, second = standings(scenes)
-        assert (first.label, first.rank, first.ended) == ("a", 1.5, 1)
-        assert np.isnan(first.median_deg)
-        assert second.median_deg == pytest.approx(np.sqrt(8))
-
-    def test_leaving_out_cameras_does_not_win(self):
-        scenes = [scene("P", entry("few", 0.1, scored=10), entry("all", 2))]
-        assert [s.label for s in standings(scenes)] == ["all", "few"]
+        first, second = standings(scenes, {("b", ""): 1.5})
+        assert (first.label, first.rank) == ("b", 1.5)
+        assert first.median_deg == pytest.approx(np.sqrt(8))
+        assert (second.label, second.ended, second.outcomes) == ("a", 1, ("timeout",))
+        assert np.isnan(second.median_deg)
+        assert np.isnan(second.rank)
 
     def test_leaderboard_has_every_rule_and_all_scenes_together(self, tmp_path):
         store = made_run(tmp_path / "run", ["P", "Q"], [Made("a"), Made("b", status="timeout", only=("Q",))])
         by_rule = under_every_rule(store, score(store))
-        board = leaderboard({rule: scenes_of(r.frame, r.ties) for rule, r in by_rule.items()})
+        board = leaderboard(by_rule)
         heads = [column["key"] for column in board["columns"]]
         texts = {column["key"]: column["values"] for column in board["columns"] if column["kind"] == "text"}
         rows = [dict(zip(heads, row, strict=True)) for row in board["rows"]]
@@ -297,34 +294,3 @@ class TestPage:
         parsed = Page(render(store, {"l1": score(store)}))
         ids = [value for name, value in parsed.attributes if name == "id"]
         assert len(ids) == len(set(ids))
-
-
-class TestFigures:
-    def test_the_frontier_holds_who_is_not_beaten_in_both(self):
-        points = {("a", ""): (1.0, 3.0), ("b", ""): (2.0, 4.0), ("c", ""): (3.0, 1.0)}
-        look = {key: figures.Look(key[0], "#000000", "-", "o") for key in points}
-        frontier, *markers = figures.against_time(points, look)["data"]
-        assert list(zip(frontier["x"], frontier["y"], strict=True)) == [(1.0, 3.0), (3.0, 1.0)]
-        assert [m["name"] for m in markers if m["text"]] == ["a", "c"]
-
-    def test_cumulative_curves_are_percentiles(self):
-        errors = np.linspace(0, 50, 101)
-        assert figures.quantiles_of([errors]) == pytest.approx(np.linspace(0, 50, 51))
-        assert figures.quantiles_of([np.full(3, np.nan)]) is None
-
-
-class TestRanks:
-    def test_the_better_method_comes_first_in_all_three(self, tmp_path):
-        methods = [Made("worse", scale_deg=3.0), Made("better", scale_deg=1.0)]
-        frame = score(made_run(tmp_path, ["a", "b", "c", "d", "e"], methods)).frame
-        probabilities, difference, profiles = ranks.sections(frame)
-        (heat,) = probabilities.figure["data"]
-        assert heat["y"] == ["better", "worse"]
-        assert heat["z"][0] == [100.0, 0.0]
-        assert difference.figure["data"][0]["x"] == [1.0, 2.0]
-        assert "over 5 problems" in difference.paragraphs[0]
-        first = {trace["name"]: trace["y"][0] for trace in profiles.figure["data"]}
-        assert first == {"worse": 0.0, "better": 100.0}
-
-    def test_one_problem_has_no_ranks(self, tmp_path):
-        assert ranks.sections(score(made_run(tmp_path, ["a"], [Made("one"), Made("two")])).frame) == []

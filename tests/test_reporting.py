@@ -7,11 +7,15 @@ import pytest
 from rich.console import Console
 
 from bench.core.errors import InputError
-from bench.reporting.figures import plots, style
+from bench.reporting.figures import style
+from bench.reporting.figures.looks import GREY, looks
+from bench.reporting.figures.paint_matplotlib import paint
+from bench.reporting.present import drawings
 from bench.reporting.tables import render as tables
 from bench.reporting.tables.console import console_blocks
 from bench.reporting.tables.latex import latex_escape
 from bench.scoring.metrics.errors import summary
+from bench.scoring.results import Results
 
 HOSTILE = "a_b%&<script>|$x$#{}\\~^*[y]"
 PLACE = ("1dsfm", "Ellis_Island", "truth-subgraph")
@@ -35,7 +39,8 @@ def row(instance, method, errors=None, *, status="ok", seed=0, n=20, **more):
         "title": title,
         "params": params,
     }
-    facts |= {"seed": seed, "protocol": "truth-subgraph", "alignment": "l1", "status": status}
+    facts |= {"seed": seed, "protocol": "truth-subgraph", "alignment": "l1"}
+    facts |= {"outcome": status.partition("(")[0], "status": status}
     facts |= {"solve_s": 0.25 if ok else None, "peak_mib": 101.5 if ok else None, "n_cameras": n}
     facts |= {"n_solved": n if ok else 0, "residual_mean_deg": 3.0, "residual_median_deg": 2.0, "notes": ""}
     return facts | summary(errors) | {"edges_percent": 66.8, "hardness": 0.0088} | more
@@ -135,7 +140,7 @@ class TestConsole:
         assert "timeout (1 of 3 seeds)" in text
 
     def test_markup_in_names_is_shown_as_it_is(self, run):
-        frame = run[0].assign(method="[bold]x[/nope]", status="error([red]no)")
+        frame = run[0].assign(method="[bold]x[/nope]", outcome="error", status="error([red]no)")
         assert "error([red]no)" in tables.render(frame, {}, ("[link]",))[0]
 
     def test_times_are_labelled(self, run):
@@ -177,7 +182,7 @@ class TestMarkdown:
         assert "| – |" in tables.render(frame, {}, (), "markdown")[0]
 
     def test_hostile_names(self, run):
-        frame = run[0].assign(title=HOSTILE, instance=HOSTILE, status="ok")
+        frame = run[0].assign(title=HOSTILE, instance=HOSTILE, outcome="ok", status="ok")
         text, _ = tables.render(frame, {}, (HOSTILE,), "markdown")
         assert "<script>" not in text
         assert not re.search(r"(?<!\\)[$#~]", text)
@@ -199,7 +204,7 @@ class TestLatex:
         assert "a note" in text
 
     def test_hostile_names(self, run):
-        frame = run[0].assign(title=HOSTILE, instance=HOSTILE, status="ok")
+        frame = run[0].assign(title=HOSTILE, instance=HOSTILE, outcome="ok", status="ok")
         text, _ = tables.render(frame, {}, (HOSTILE,), "latex")
         assert r"a\_b\%\&\textless{}script\textgreater{}" in text
         bare = text.replace(r"\{", "").replace(r"\}", "")
@@ -226,11 +231,17 @@ def test_unknown_format_names_the_nearest(run):
         render(run, "latx")
 
 
+def drawn(frame, errors, *names):
+    """Figures of a run, all or those named."""
+    found = drawings(Results(frame, errors, {}, (), "l1", {}))
+    return {name: paint(drawing) for name, drawing in found.items() if not names or name in names}
+
+
 class TestPlots:
     def test_files_are_valid_in_every_format(self, run, tmp_path):
         heads = {"png": b"\x89PNG\r\n", "pdf": b"%PDF-", "svg": b"<?xml"}
-        figure = plots.error_per_scene(run[0], run[1])
-        paths = plots.save(figure, tmp_path / "new", "fig")
+        (figure,) = drawn(*run[:2], "error-per-scene").values()
+        paths = style.save(figure, tmp_path / "new", "fig")
         assert [path.name for path in paths] == ["fig.png", "fig.pdf", "fig.svg"]
         for path in paths:
             assert path.read_bytes().startswith(heads[path.suffix[1:]])
@@ -240,68 +251,66 @@ class TestPlots:
 
     def test_files_do_not_depend_on_the_day(self, run, tmp_path):
         first, second = (
-            plots.save(plots.cumulative_errors(run[0], run[1]), tmp_path / name, "fig", ("pdf", "svg")) for name in "ab"
+            style.save(drawn(*run[:2], "cumulative-errors").popitem()[1], tmp_path / name, "fig", ("pdf", "svg"))
+            for name in "ab"
         )
         assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
 
     def test_every_figure_names_alignment_and_what_is_not_drawn(self, run):
-        for figure in plots.figures(*run[:2]).values():
+        for figure in drawn(*run[:2]).values():
             caption = " ".join(figure._supxlabel.get_text().split())
             assert "Alignment: l1" in caption
             assert "Union Square (930)" in caption
 
     def test_failures_are_written_where_there_are_no_errors(self, run):
         frame = pd.concat([run[0], pd.DataFrame([row("Ellis_Island", ("sdp", "SDP", ""), status=SKIPPED)])])
-        figure = plots.error_per_scene(frame, run[1])
+        (figure,) = drawn(frame, run[1], "error-per-scene").values()
         assert "skipped" in {text.get_text() for text in figure.axes[0].texts}
 
     def test_a_method_has_one_colour(self, run):
-        looks = style.looks(run[0])
-        curves = plots.cumulative_errors(*run[:2]).axes[0].lines
-        assert [line.get_color() for line in curves] == [look.color for look in looks.values()]
-        points = {line.get_color() for line in plots.error_against_time(run[0]).axes[0].lines}
-        assert points >= {look.color for look in looks.values()}
-
-    def test_twenty_five_looks_differ(self):
-        frame = pd.DataFrame([row("S", (f"m{k}", "Same", "")) for k in range(25)])
-        looks = style.looks(frame).values()
-        assert len({(look.color, str(look.line)) for look in looks}) == 25
-        assert len({(look.color, look.marker) for look in looks}) == 25
-        assert len({look.label for look in looks}) == 25
+        shown = looks(run[0])
+        (curves,) = drawn(*run[:2], "cumulative-errors").values()
+        assert [line.get_color() for line in curves.axes[0].lines] == [look.color for look in shown.values()]
+        (points,) = drawn(*run[:2], "error-against-time").values()
+        assert {line.get_color() for line in points.axes[0].lines} == {GREY} | {look.color for look in shown.values()}
 
     def test_the_frontier_holds_what_nothing_beats(self):
         values = {"fast": (1, 9.0), "good": (5, 2.0), "beaten": (6, 3.0), "best": (9, 1.0)}
         rows = [row("S", (name, name, ""), np.full(20, e), solve_s=t) for name, (t, e) in values.items()]
-        axes = plots.error_against_time(pd.DataFrame(rows)).axes[0]
-        frontier = next(line for line in axes.lines if line.get_color() == style.GREY)
+        errors = {("1dsfm", "S", "truth-subgraph"): {(name, ""): (np.full(20, e),) for name, (_, e) in values.items()}}
+        (figure,) = drawn(pd.DataFrame(rows), errors, "error-against-time").values()
+        frontier = next(line for line in figure.axes[0].lines if line.get_color() == GREY)
         assert np.array_equal(frontier.get_xdata(), [1, 5, 9])
 
     def test_aggregated_takes_methods_that_ended_well_everywhere(self):
         a, b = METHODS[:2]
         rows = [row("S", a, np.full(20, 1.0)), row("T", a, np.full(20, 4.0)), row("S", b, np.ones(20))]
         rows.append(row("T", b, status="timeout"))
-        figure = plots.error_against_time(pd.DataFrame(rows), aggregated=True)
-        drawn = [line.get_ydata() for line in figure.axes[0].lines if line.get_color() != style.GREY]
-        assert np.allclose(drawn, [[2.0]])
+        errors = {
+            ("1dsfm", s, "truth-subgraph"): {("spectral", ""): (np.full(20, e),)} for s, e in (("S", 1), ("T", 4))
+        }
+        (figure,) = drawn(pd.DataFrame(rows), errors, "error-against-time-all-scenes").values()
+        points = [line.get_ydata() for line in figure.axes[0].lines if line.get_color() != GREY]
+        assert np.allclose(points, [[2.0]])
         assert "left out: L1-IRLS" in " ".join(figure._supxlabel.get_text().split())
 
     def test_hostile_names_and_exact_zeros(self, run, tmp_path):
-        frame = run[0].assign(title=HOSTILE, instance=HOSTILE, status="ok", median_deg=0.0)
+        frame = run[0].assign(title=HOSTILE, instance=HOSTILE, outcome="ok", status="ok", median_deg=0.0)
         errors = {("1dsfm", HOSTILE, "truth-subgraph"): {("spectral", ""): (np.zeros(20),)}}
-        for name, figure in plots.figures(frame, errors).items():
-            plots.save(figure, tmp_path, name, ("svg",))
+        for name, figure in drawn(frame, errors).items():
+            style.save(figure, tmp_path, name, ("svg",))
             assert "below 0.001°" in figure._supxlabel.get_text() or name == "cumulative-errors"
 
     def test_without_any_truth_nothing_is_drawn(self, run):
         frame = run[0][run[0]["instance"] == "Union_Square"]
-        assert plots.figures(frame, {}) == {}
+        assert drawn(frame, {}) == {}
 
     def test_the_legend_is_beside_the_axes(self):
         rng = np.random.default_rng(0)
         methods = [(f"m{k}", f"A method with a long name {k}", "depth=3") for k in range(25)]
         values = {(m, p): (rng.gamma(2, 1, 20),) for m, _, p in methods}
         frame = pd.DataFrame([row("Ellis_Island", method, values[method[0], method[2]][0]) for method in methods])
-        for draw in (plots.cumulative_errors(frame, {PLACE: values}), plots.error_against_time(frame)):
+        for draw in drawn(frame, {PLACE: values}, "cumulative-errors", "error-against-time").values():
             draw.draw_without_rendering()
             legend = draw.legends[0].get_window_extent()
             assert legend.x0 >= max(ax.get_window_extent().x1 for ax in draw.axes)

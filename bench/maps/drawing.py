@@ -17,7 +17,8 @@ from bench.maps.axes import Axis
 from bench.maps.bounds import Limits
 from bench.maps.criterion import Criterion
 from bench.maps.sweep import Layers
-from bench.reporting.figures.style import COLORS, LINES, describe, panels, styled
+from bench.reporting.figures.looks import LINES, look_of
+from bench.reporting.figures.style import describe, panels, styled
 
 OUTCOMES = LinearSegmentedColormap.from_list("outcomes", ["#f0b489", "#f7f7f7", "#8fbfe0"])
 FAINT = 0.35  # how strongly a cell shows that has no sample of its own
@@ -47,21 +48,24 @@ def draw(
         What stands above and below.
     """
     lines = _lines(limits, success) if limits is not None else []
-    looks = {m: (COLORS[k % len(COLORS)], LINES[k // len(COLORS) % len(LINES)]) for k, m in enumerate(layers)}
+    looks = {m: look_of(m) for m in layers}
     with styled():
-        handles = [Line2D([], [], color=color, linestyle=line, label=m) for m, (color, line) in looks.items()]
+        handles = [Line2D([], [], color=look.color, linestyle=look.line, label=m) for m, look in looks.items()]
         handles += [Line2D([], [], color=INK, linewidth=1, linestyle=line, label=label) for label, line, _, _ in lines]
         figure, drawn = panels(len(layers) + 1, 2.3, 2.2, handles)
         widths = np.linspace(WIDEST, THINNEST, len(layers))
         together = drawn[-1]
         together.set_title("every boundary", loc="left")
         for ax, (method, own), width in zip(drawn, layers.items(), widths, strict=False):
-            color, style = looks[method]
             ax.set_title(method, loc="left")
             _cells(ax, own)
             ends = list(boundary(own.success))
             ax.add_collection(LineCollection(ends, colors=INK, linewidths=1.6))
-            together.add_collection(LineCollection(ends, colors=color, linestyles=[style], linewidths=float(width)))
+            together.add_collection(
+                LineCollection(
+                    ends, colors=looks[method].color, linestyles=[looks[method].line], linewidths=float(width)
+                )
+            )
         for ax in drawn:
             for _, line, values, level in lines:
                 ax.contour(values.T, levels=[level], colors=INK, linewidths=1, linestyles=[line])

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
-from pathlib import Path
 
 from bench.core.errors import InputError, shown
 
@@ -24,10 +23,8 @@ class Sources:
 
     @classmethod
     def shipped(cls) -> "Sources":
-        """What comes with the project: in a checkout in ``results``, beside this bench; else inside the package."""
-        beside = Path(__file__).parents[2] / "results"
-        folders = ("published", "reference")
-        return cls(*(beside / name if beside.is_dir() else resources.files(f"bench.{name}") for name in folders))
+        """What comes with the project."""
+        return cls(*(resources.files(f"bench.results.{name}") for name in ("published", "reference")))
 
 
 def read_published(folder: Traversable, name: str) -> list[dict[str, str]]:

@@ -15,8 +15,7 @@
 The file ``bench-style.toml`` of the working folder is in force wherever no other is named.
 """
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,6 +24,7 @@ from typing import TYPE_CHECKING
 from bench.core import typed
 from bench.core.errors import InputError, suggestion
 from bench.formats import toml_file
+from bench.plugins.selection import label
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,11 +71,11 @@ class Appearance:
 
     def of(self, method: str, params: str) -> MethodLook:
         """What is given for a configured method."""
-        return self.methods.get(_label(method, params)) or self.methods.get(method, MethodLook())
+        return self.methods.get(label(method, params)) or self.methods.get(method, MethodLook())
 
     def head(self, method: str, params: str, title: str) -> tuple[str, str]:
         """Title and parameters as shown: a name given to a configured method stands for its parameters too."""
-        if params and (own := self.methods.get(_label(method, params))) and own.name:
+        if params and (own := self.methods.get(label(method, params))) and own.name:
             return own.name, ""
         return self.of(method, params).name or title, params
 
@@ -86,7 +86,7 @@ class Appearance:
         place = {name: k for k, name in enumerate(self.order)}
         last = len(self.order)
         keys = [
-            place.get(_label(m, p), place.get(m, last)) for m, p in zip(frame["method"], frame["params"], strict=True)
+            place.get(label(m, p), place.get(m, last)) for m, p in zip(frame["method"], frame["params"], strict=True)
         ]
         scenes = frame.groupby(["dataset", "instance", "protocol"], sort=False, dropna=False).ngroup()
         order = sorted(range(len(frame)), key=lambda k: (scenes.iloc[k], keys[k]))
@@ -104,16 +104,6 @@ def current() -> Appearance:
 def put_in_force(appearance: Appearance) -> None:
     """Have everything that this process draws look so."""
     _IN_FORCE.set(appearance)
-
-
-@contextmanager
-def using(appearance: Appearance) -> Iterator[None]:
-    """Put an appearance in force for a while."""
-    token = _IN_FORCE.set(appearance)
-    try:
-        yield
-    finally:
-        _IN_FORCE.reset(token)
 
 
 def find(given: Path | None = None) -> tuple[Appearance, Path | None]:
@@ -213,7 +203,3 @@ def _check_color(value: str, where: str, key: str) -> None:
 def _check(fits: bool, where: str, key: str, wanted: str, value: object) -> None:
     if not fits:
         raise InputError(f"{where}: {key} must be {wanted}, not {value!r}")
-
-
-def _label(method: str, params: str) -> str:
-    return f"{method}[{params}]" if params else method

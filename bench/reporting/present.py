@@ -1,11 +1,17 @@
 """From a scored run to files: every table format and every figure."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bench.reporting import appearance
 from bench.reporting.tables import render
 from bench.reporting.tables.intervals import with_intervals
+from bench.reporting.tables.rows import scenes
+from bench.reporting.tables.standing import overall
 from bench.scoring.results import Results
+
+if TYPE_CHECKING:
+    from bench.reporting.figures.data import Drawing
 
 EXTENSIONS = {"console": "txt", "markdown": "md", "csv": "csv", "latex": "tex"}
 
@@ -31,17 +37,36 @@ def write_tables(results: Results, folder: Path) -> list[Path]:
     return written
 
 
+def drawings(results: Results) -> "dict[str, Drawing]":
+    """Every figure that the run has data for, by file name."""
+    from bench.reporting.figures import errors, looks, ranking
+
+    frame = appearance.current().ordered(results.frame)
+    run = errors.Run(frame, scenes(frame, results.ties), results.errors, looks.looks(frame))
+    found: dict[str, Drawing] = {}
+    if known := run.known:
+        found["error-per-scene"] = errors.spreads(run, known)
+        found["cumulative-errors"] = errors.cumulative(run, known)
+        found["error-against-time"] = errors.against_time(run, known)
+        standing = overall(frame, results.ties)[1]
+        if len(known) > 1:
+            found["error-against-time-all-scenes"] = errors.against_time_overall(run, standing)
+        found |= ranking.rankings(frame, run.looks)
+    if results.curves:
+        found["error-over-iterations"] = errors.iterations(run, results.curves)
+    return found
+
+
 def write_plots(results: Results, folder: Path) -> list[Path]:
     """Draw every figure that the run has data for, as PNG, PDF and SVG; those for a paper with a file of captions."""
-    from bench.reporting.figures import captions, iterations, plots
+    from bench.reporting.figures.captions import captions
+    from bench.reporting.figures.paint_matplotlib import paint
+    from bench.reporting.figures.style import save
 
     folder.mkdir(parents=True, exist_ok=True)
-    frame = appearance.current().ordered(results.frame)
-    figures = plots.figures(frame, results.errors)
-    if results.curves:
-        figures["error-over-iterations"] = iterations.error_over_iterations(frame, results.curves)
-    written = [path for name, figure in figures.items() for path in plots.save(figure, folder, name)]
+    figures = {name: paint(drawing) for name, drawing in drawings(results).items()}
+    written = [path for name, figure in figures.items() for path in save(figure, folder, name)]
     if appearance.current().width_in and figures:
         written.append(folder / "captions.tex")
-        written[-1].write_text(captions.captions(figures), encoding="utf-8")
+        written[-1].write_text(captions(figures), encoding="utf-8")
     return written

@@ -166,7 +166,7 @@ def _frame(jobs: Sequence[Job], table: "pa.Table", rule: str) -> "pd.DataFrame":
     )
     times = table.select(TIMES).to_pandas() if any(job.rounds for job in jobs) else pd.DataFrame()
     scored = table.drop_columns([*HIDDEN, *TIMES]).to_pandas()
-    first = ["protocol", "alignment", "status"]
+    first = ["protocol", "alignment", "outcome", "status"]
     scored.insert(0, "alignment", rule)
     scored = scored[[*first, *(name for name in scored if name not in (*first, "notes", "job")), "notes", "job"]]
     if not times.empty:

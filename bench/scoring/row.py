@@ -38,6 +38,7 @@ def scored(instance: Instance, record: Mapping[str, Any], estimate: Estimate | N
             scores["roc_auc"] = roc_auc(estimate.edge_weights, instance.outliers)
     return {
         "protocol": instance.protocol,
+        "outcome": record["outcome"],
         "status": record["status"],
         **summary(errors),
         **{name: record.get(name) for name in MEASURED},

@@ -1,28 +1,21 @@
-"""How figures look: one colour, marker and line for each method, and how a figure is saved."""
+"""The page that figures are drawn on: fonts, panels, legends, titles; and how a figure is saved."""
 
 import math
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from bench.reporting import appearance
-from bench.reporting.tables.rows import Configured
+from bench.reporting.figures.looks import GREY
 
-# Okabe and Ito's palette, told apart with any colour vision; its yellow is too light for lines on white.
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-LINES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
-GREY = "#666666"
 FORMATS = ("png", "pdf", "svg")
 SETTINGS: dict[Any, Any] = {
     "font.size": 8,
@@ -42,46 +35,8 @@ SETTINGS: dict[Any, Any] = {
     "savefig.dpi": 200,
 }
 LEGEND_LINE = 0.17  # inches
-LABEL = 24  # characters of a line
 MOST_COLUMNS = 3
 NARROWEST_PANEL = 2.0  # inches
-
-
-@dataclass(frozen=True)
-class Look:
-    """How a configured method is called and drawn, the same in every figure of a run."""
-
-    label: str
-    color: str
-    line: Any
-    marker: str
-
-
-def looks(frame: pd.DataFrame) -> dict[Configured, Look]:
-    """A look for each configured method, in the order in which the frame first names them; 28 differ."""
-    wanted = appearance.current()
-    colors = wanted.colors or COLORS
-    found = frame.drop_duplicates(["method", "params"])
-    keys = list(zip(found["method"], found["params"], strict=True))
-    shown = [wanted.head(*key, str(title)) for key, title in zip(keys, found["title"], strict=True)]
-    heads = [f"{title} ({params})" if params else title for title, params in shown]
-    out = {}
-    for k, ((method, params), head) in enumerate(zip(keys, heads, strict=True)):
-        own = wanted.of(method, params)
-        turn = k // len(colors)
-        label = head if heads.count(head) == 1 else f"{head} [{method}]"
-        out[method, params] = Look(
-            label="\n".join(textwrap.wrap(label.replace(",", ", "), LABEL)) if wanted.width_in else label,
-            color=own.color or colors[k % len(colors)],
-            line=own.line or LINES[turn % len(LINES)],
-            marker=own.marker or MARKERS[(k + turn) % len(MARKERS)],
-        )
-    return out
-
-
-def lines_of(look: Mapping[Configured, Look]) -> int:
-    """Lines of the tallest label: in a figure for a paper long ones are wrapped."""
-    return max((style.label.count("\n") + 1 for style in look.values()), default=1)
 
 
 @contextmanager

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.core.outcome import OK
 from bench.core.problem import Floats, Instance
-from bench.reporting.tables.rows import OK
+from bench.plugins.selection import label
 from bench.scoring.metrics.errors import camera_errors
 from bench.scoring.metrics.folds import Fold, find_folds
 from bench.scoring.metrics.oracle import ORACLE
@@ -89,7 +90,7 @@ def gather(store: Store, results: Results, place: Place) -> Case | None:
     """
     frame = results.frame
     here = (frame["dataset"] == place[0]) & (frame["instance"] == place[1]) & (frame["protocol"] == place[2])
-    rows = frame[here & (frame["status"] == OK) & (frame["stop_reason"] != ORACLE)]
+    rows = frame[here & (frame["outcome"] == OK) & (frame["stop_reason"] != ORACLE)]
     if rows.empty:
         return None
     key_of = {job.id: job.instance_key for job in store.jobs()}
@@ -104,7 +105,7 @@ def gather(store: Store, results: Results, place: Place) -> Case | None:
         solved.append(
             Solved(
                 (row["method"], row["params"]),
-                f"{row['method']}[{row['params']}]" if row["params"] else str(row["method"]),
+                label(row["method"], row["params"]),
                 estimate.rotations,
                 estimate.edge_weights,
                 camera_errors(estimate.rotations, truth, results.alignment),

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.core.problem import Floats
-from bench.reporting.html import figures, words
+from bench.reporting.figures.looks import Looks
+from bench.reporting.figures.paint_plotly import FigureDict, dash
+from bench.reporting.html import words
 from bench.reporting.html.case import Case, Solved
-from bench.reporting.html.section import FigureDict, Section, Table, Value, anchor
+from bench.reporting.html.section import Section, Table, Value, anchor
 from bench.reporting.tables.rows import area
 from bench.scoring.metrics.cycles import WRONG_DEG, agreeing_share, sample_cycles
 from bench.scoring.metrics.roc import roc_curve
@@ -67,7 +69,7 @@ def _histogram(residuals: Floats, name: str, color: str) -> dict[str, object]:
     }
 
 
-def roc_section(case: Case, looks: figures.Looks) -> list[Section]:
+def roc_section(case: Case, looks: Looks) -> list[Section]:
     """Outliers that low edge weights catch; empty where the outliers are unknown or no method gives weights."""
     outliers = case.instance.outliers
     if outliers is None:
@@ -78,7 +80,7 @@ def roc_section(case: Case, looks: figures.Looks) -> list[Section]:
             continue
         lost, caught = roc_curve(solved.edge_weights, outliers, points=60)
         if len(lost):
-            line = {"color": looks[solved.key].color, "dash": figures.dash(looks[solved.key]), "width": 1.8}
+            line = {"color": looks[solved.key].color, "dash": dash(looks[solved.key]), "width": 1.8}
             name = f"{solved.label}: {area(float(solved.scores['roc_auc']))}"
             hover = "%{y:.1f} % of outliers for %{x:.1f} % of inliers<extra></extra>"
             trace = {"type": "scatter", "mode": "lines", "name": name, "x": 100 * lost, "y": 100 * caught}

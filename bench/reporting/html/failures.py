@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from bench.reporting.tables.rows import OK, Scene
+from bench.core.outcome import OK
+from bench.plugins.selection import label
+from bench.reporting.tables.rows import Scene
 from bench.storage.store import Store
 
 LOG_LENGTH = 1500  # characters of a log that are shown
@@ -35,7 +37,7 @@ def failures(store: Store, frame: pd.DataFrame) -> list[Failure]:
     """Failures in the order of the frame, those of one method with the same status together."""
     several = frame["seed"].nunique() > 1
     found = []
-    for (method, params, status), rows in frame[frame["status"] != OK].groupby(
+    for (method, params, status), rows in frame[frame["outcome"] != OK].groupby(
         ["method", "params", "status"], sort=False
     ):
         where = [
@@ -44,8 +46,7 @@ def failures(store: Store, frame: pd.DataFrame) -> list[Failure]:
         ]
         logs = (str((store.record(job) or {}).get("log", "")).strip() for job in rows["job"])
         log = next(filter(None, logs), "")[-LOG_LENGTH:]
-        label = f"{method}[{params}]" if params else str(method)
-        found.append(Failure(label, str(status), tuple(dict.fromkeys(where)), log))
+        found.append(Failure(label(str(method), str(params)), str(status), tuple(dict.fromkeys(where)), log))
     return found
 
 
@@ -56,4 +57,4 @@ def notes(scenes: Sequence[Scene]) -> list[tuple[str, str, str]]:
         for entry in scene.entries:
             for note in entry.notes:
                 found.setdefault((entry.label, note), []).append(scene.instance)
-    return [(label, ", ".join(dict.fromkeys(where)), note) for (label, note), where in found.items()]
+    return [(method, ", ".join(dict.fromkeys(where)), note) for (method, note), where in found.items()]

@@ -9,15 +9,17 @@ from typing import Any
 import numpy as np
 
 from bench.core.problem import Floats, Ints, Problem
+from bench.reporting.figures.paint_plotly import FigureDict
 from bench.reporting.html.case import Solved
-from bench.reporting.html.section import FigureDict
 from bench.scoring.metrics.folds import Fold
 
 GRID = 1000
 EDGES = 300  # drawn of each figure
-WORK = 2e8  # pairs of cameras of all iterations together, from which on there are fewer iterations
-NEARER = 0.6  # exponent of the distance from the middle: a few cameras far out leave room for the others
-START = 10  # cameras; below, the layout starts at random
+STEPS = 60  # of the springs
+PULL = 4.0  # edges of a camera that pull with full strength; where it has more, each pulls less
+REACH = 2.0  # ideal lengths of an edge, up to which cameras push each other away
+NEARER = 0.8  # exponent of the distance from the middle: a few cameras far out leave room for the others
+START = 10  # cameras; fewer start on a circle
 ERRORS_DEG = (0.1, 0.3, 1, 3, 10, 30, 100)
 # Blue to vermilion of Okabe and Ito's palette over a light grey: both ends stand out on white and on black.
 COLORS = ("#0072B2", "#4292c6", "#9ecae1", "#c8c8c8", "#f0b27a", "#e58a3c", "#D55E00")
@@ -27,16 +29,26 @@ GREY = "#808080"
 
 
 def layout(problem: Problem) -> Ints:
-    """Positions (n, 2) from 0 to `GRID`: springs along the edges (Fruchterman and Reingold 1991), spectral start."""
-    import rustworkx
+    """Positions (n, 2) from 0 to `GRID`: springs along the edges (Fruchterman and Reingold 1991), spectral start.
 
-    graph = rustworkx.PyGraph()
-    graph.add_nodes_from(range(problem.n))
-    graph.add_edges_from_no_data([(int(i), int(j)) for i, j in problem.edges])
-    start = dict(enumerate(map(tuple, _spectral(problem).tolist()))) if problem.n >= START else None
-    iterations = int(np.clip(WORK / problem.n**2, 30, 100))
-    placed = rustworkx.spring_layout(graph, pos=start, num_iter=iterations, seed=0)
-    positions = np.array([placed[k] for k in range(problem.n)])
+    As in their grid variant, cameras push each other away only where they are near.
+    """
+    from scipy.spatial import KDTree
+
+    n = problem.n
+    positions = _spectral(problem) * np.sqrt(n) / 2  # an ideal edge has length 1
+    ends, pull = problem.edges.T, min(1.0, PULL / float(problem.degree.mean()))
+    for step in np.geomspace(1.0, 0.02, STEPS):
+        near = KDTree(positions).query_pairs(REACH, output_type="ndarray").T
+        moves = np.zeros((n, 2))
+        for (i, j), pushes in ((near, True), (ends, False)):
+            apart = positions[i] - positions[j]
+            distance = np.maximum(np.linalg.norm(apart, axis=1, keepdims=True), 1e-3)
+            force = apart / distance * (1 / distance if pushes else -pull * distance)
+            for k in range(2):
+                moves[:, k] += np.bincount(i, force[:, k], n) - np.bincount(j, force[:, k], n)
+        length = np.linalg.norm(moves, axis=1, keepdims=True)
+        positions = positions + moves * np.minimum(1, step / np.maximum(length, 1e-12))
     offset = positions - np.median(positions, axis=0)
     distance = np.linalg.norm(offset, axis=1, keepdims=True)
     positions = offset * np.maximum(distance, 1e-12) ** (NEARER - 1)
@@ -83,11 +95,16 @@ def _spectral(problem: Problem) -> Floats:
     from scipy import sparse
     from scipy.sparse.linalg import eigsh
 
+    n = problem.n
+    angles = 2 * np.pi * np.arange(n) / n
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    if n < START:
+        return circle
     scale = 1 / np.sqrt(np.maximum(problem.degree, 1))
     walk = sparse.diags_array(scale) @ problem.adjacency() @ sparse.diags_array(scale)
-    _, vectors = eigsh(walk, k=3, which="LA", v0=np.cos(np.arange(problem.n)))  # eigenvalues ascend
+    _, vectors = eigsh(walk, k=3, which="LA", v0=np.cos(np.arange(n)))  # eigenvalues ascend
     plane: Floats = vectors[:, 1::-1] * scale[:, None]
-    return plane / np.abs(plane).max(axis=0)
+    return plane / np.abs(plane).max(axis=0) + 1e-3 * circle  # which parts cameras that coincide
 
 
 def _edges(problem: Problem, positions: Ints, residuals: Floats) -> list[dict[str, Any]]:

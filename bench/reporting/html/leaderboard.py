@@ -1,14 +1,16 @@
 """The rows of the leaderboard: every method on every scene and over all scenes, under every alignment rule."""
 
 import dataclasses
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from bench.reporting.html.embed import rounded
-from bench.reporting.html.standing import ranks, standings
-from bench.reporting.tables.rows import Entry, Scene, Value
+from bench.reporting.tables.rows import Entry, Scene
+from bench.reporting.tables.rows import scenes as scenes_of
+from bench.reporting.tables.standing import ranks_of, standings
+from bench.scoring.inference.blocks import blocks, by_scene
+from bench.scoring.results import Configured, Place, Results
 
 ALL_SCENES = "All scenes"
 
@@ -28,7 +30,12 @@ COLUMNS = (
     Column("scene", "Scene", "text", "Instance, or all scenes with ground truth together"),
     Column("protocol", "Protocol", "text", "Which cameras are solved and scored"),
     Column("alignment", "Alignment", "text", "The rule that removed the gauge"),
-    Column("rank", "Rank", "number", "Rank of the median error; over all scenes the mean rank, failures last"),
+    Column(
+        "rank",
+        "Rank",
+        "number",
+        "By median error, failures last: mean over the problems of a scene, then over scenes",
+    ),
     Column("median", "Median °", "deg", "Median error over the scored cameras; over all scenes the geometric mean"),
     Column("mean", "Mean °", "deg", "Mean error over the scored cameras; over all scenes the geometric mean"),
     Column("p90", "90 % °", "deg", "90th percentile of the error over the scored cameras"),
@@ -44,12 +51,12 @@ COLUMNS = (
 )
 
 
-def leaderboard(by_rule: Mapping[str, Sequence[Scene]]) -> dict[str, Any]:
+def leaderboard(by_rule: Mapping[str, Results]) -> dict[str, Any]:
     """Columns and rows as the page reads them; a column that no row has a value in is left out.
 
     Texts are written once: a column of kind text has its ``values``, and the rows hold their numbers in it.
     """
-    rows = [row for scenes in by_rule.values() for row in _rows(scenes)]
+    rows = [row for results in by_rule.values() for row in _rows(results)]
     columns = [c for c in COLUMNS if any(row.get(c.key) is not None for row in rows)]
     texts = {c.key: list(dict.fromkeys(row.get(c.key) for row in rows)) for c in columns if c.kind == "text"}
     number = {key: {value: k for k, value in enumerate(values)} for key, values in texts.items()}
@@ -59,24 +66,28 @@ def leaderboard(by_rule: Mapping[str, Sequence[Scene]]) -> dict[str, Any]:
             [number[c.key][row.get(c.key)] if c.key in number else row.get(c.key) for c in columns] for row in rows
         ],
         "best": [k for k, row in enumerate(rows) if row["best"]],
+        "failed": {k: row["failed"] for k, row in enumerate(rows) if row["failed"]},
         "all": ALL_SCENES,
     }
 
 
-def _rows(scenes: Sequence[Scene]) -> Iterator[dict[str, Any]]:
-    for protocol in dict.fromkeys(scene.protocol for scene in scenes):
+def _rows(results: Results) -> Iterator[dict[str, Any]]:
+    scenes = scenes_of(results.frame, results.ties)
+    ranks: dict[Place, dict[Configured, float]] = {}
+    for protocol, rows in results.frame.groupby("protocol", sort=False):
         own = [scene for scene in scenes if scene.protocol == protocol]
         if len(own) > 1:
-            yield from _overall(own)
+            yield from _overall(own, ranks_of(blocks(rows)))
+        ranks |= {(*place, str(protocol)): ranks_of(table) for place, table in by_scene(rows).items()}
     several = len({scene.dataset for scene in scenes}) > 1
     for scene in scenes:
         name = f"{scene.dataset} / {scene.instance}" if several else scene.instance
-        for entry, rank in zip(scene.entries, ranks(scene), strict=True):
-            yield _row(scene, name, entry, rank)
+        for entry in scene.entries:
+            yield _row(scene, name, entry, ranks.get(scene.place, {}).get(entry.key))
 
 
-def _overall(scenes: Sequence[Scene]) -> Iterator[dict[str, Any]]:
-    for standing in standings(scenes):
+def _overall(scenes: Sequence[Scene], ranks: Mapping[Configured, float]) -> Iterator[dict[str, Any]]:
+    for standing in standings(scenes, ranks):
         yield {
             "method": standing.label,
             "scene": ALL_SCENES,
@@ -89,12 +100,13 @@ def _overall(scenes: Sequence[Scene]) -> Iterator[dict[str, Any]]:
             "mean": rounded(standing.mean_deg),
             "time": rounded(standing.seconds),
             "best": len(standing.best_on) == standing.scenes,
+            "failed": standing.outcomes,
         }
 
 
-def _row(scene: Scene, name: str, entry: Entry, rank: float) -> dict[str, Any]:
+def _row(scene: Scene, name: str, entry: Entry, rank: float | None) -> dict[str, Any]:
     def value(key: str) -> float | int | None:
-        return rounded(entry.values.get(key, Value(math.nan)).mean)
+        return rounded(entry.value(key).mean)
 
     return {
         "method": entry.label,
@@ -102,7 +114,7 @@ def _row(scene: Scene, name: str, entry: Entry, rank: float) -> dict[str, Any]:
         "protocol": scene.protocol,
         "alignment": scene.alignment,
         "outcome": entry.failure or "ok",
-        "rank": rank if entry.ok and entry.scored else None,
+        "rank": rounded(rank) if rank is not None and entry.ok and entry.scored else None,
         "median": value("median_deg"),
         "mean": value("mean_deg"),
         "p90": value("p90_deg"),
@@ -114,4 +126,5 @@ def _row(scene: Scene, name: str, entry: Entry, rank: float) -> dict[str, Any]:
         "memory": value("peak_mib"),
         "cameras": f"{entry.solved}/{entry.scored}/{scene.cameras}" if entry.ok else None,
         "best": entry.best,
+        "failed": entry.outcomes,
     }

@@ -11,21 +11,22 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from bench.reporting.html import overview, ranks, reversals, words
+from bench.reporting.figures.errors import Run
+from bench.reporting.figures.looks import looks_by_selection
+from bench.reporting.html import overview, reversals, words
 from bench.reporting.html.embed import compact
 from bench.reporting.html.failures import Failure, failures, notes
 from bench.reporting.html.leaderboard import leaderboard
 from bench.reporting.html.origin import Facts, origin
 from bench.reporting.html.scene import sections as forensics
-from bench.reporting.html.section import SceneSections, Section, Table, Value, anchor
-from bench.reporting.html.standing import standings
+from bench.reporting.html.section import Section, Table, Value, anchor
 from bench.reporting.tables.rows import Scene, is_timed
 from bench.reporting.tables.rows import scenes as scenes_of
+from bench.reporting.tables.standing import overall
 from bench.scoring.results import Results
 from bench.storage.store import Store
 
 FILE_NAME = "report.html"
-SCENE_PARTS: tuple[SceneSections, ...] = (overview.scene_sections, forensics)
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,11 @@ def render(store: Store, by_rule: Mapping[str, Results]) -> str:
     results = next(iter(by_rule.values()))
     by_scene = {rule: scenes_of(r.frame, r.ties) for rule, r in by_rule.items()}
     scenes = by_scene[results.alignment]
-    headline = _headline(scenes)
-    standing = standings(headline)
+    headline, standing = overall(results.frame, results.ties)
     suites = list(dict.fromkeys(plan.suite for plan in store.plans()))
-    sections = [*overview.overall(results, headline, standing), *ranks.sections(results.frame)]
+    sections = overview.overall(results, headline, standing)
     pages = _scene_pages(store, results, scenes)
-    data = {"leaderboard": leaderboard(by_scene)} | {
+    data = {"leaderboard": leaderboard(by_rule)} | {
         f"figure-{s.id}": compact(s.figure) for s in [*sections, *(s for p in pages for s in p.sections)] if s.figure
     }
     return _html(
@@ -84,12 +84,6 @@ def render(store: Store, by_rule: Mapping[str, Results]) -> str:
         origin=origin(store, results.frame["job"]),
         data=data,
     )
-
-
-def _headline(scenes: Sequence[Scene]) -> list[Scene]:
-    """What the findings are about: one protocol, where a scene was run under several."""
-    several = len({(s.dataset, s.instance) for s in scenes}) < len(scenes)
-    return [s for s in scenes if not several or s.protocol == scenes[0].protocol]
 
 
 def _flags(
@@ -117,15 +111,15 @@ def _under_every(scenes: Sequence[Scene], protocols: Sequence[str]) -> dict[str,
 def _scene_pages(store: Store, results: Results, scenes: Sequence[Scene]) -> list[ScenePage]:
     several = len({scene.dataset for scene in scenes}) > 1
     protocols = len({scene.protocol for scene in scenes}) > 1
+    run = Run(results.frame, scenes, results.errors, looks_by_selection(results.frame))
     pages = []
     used: set[str] = set()
     for scene in scenes:
-        place = (scene.dataset, scene.instance, scene.protocol)
-        sections = [s for part in SCENE_PARTS for s in part(store, results, place)]
+        sections = [*overview.of_scene(run, scene, results.curves), *forensics(store, results, scene.place)]
         title = f"{f'{scene.dataset} / ' if several else ''}{words.spoken(scene)}"
         pages.append(
             ScenePage(
-                _unique(anchor("scene", *place), used),
+                _unique(anchor("scene", *scene.place), used),
                 f"{title} ({scene.protocol})" if protocols else title,
                 _facts(scene),
                 tuple(replace(s, id=_unique(s.id, used)) for s in sections),
@@ -137,7 +131,7 @@ def _scene_pages(store: Store, results: Results, scenes: Sequence[Scene]) -> lis
 def _facts(scene: Scene) -> str:
     """One line: cameras, who is best, what failed."""
     best = [e for e in scene.entries if e.best]
-    failed = sum(sum(e.failures.values()) for e in scene.entries)
+    failed = sum(failed.seeds for e in scene.entries for failed in e.failures)
     parts = [words.count(scene.cameras, "camera")]
     if best:
         parts.append(f"best: {words.enumeration([e.label for e in best])}")

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import combinations
 
-from bench.reporting.html.standing import ended_well
-from bench.reporting.tables.rows import Configured, Entry, Scene
+from bench.reporting.tables.rows import Entry, Scene
+from bench.reporting.tables.standing import ended_well
 from bench.scoring.inference.dominance import clearly_better
 from bench.scoring.inference.resampling import FLOOR_DEG
-from bench.scoring.results import Place, Results
+from bench.scoring.results import Configured, Place, Results
 
 MARGIN = 1.05  # medians closer than this ratio are not an order
 Better = Mapping[Place, Set[tuple[Configured, Configured]]]  # pairs of which the first is better beyond chance
@@ -50,9 +50,9 @@ def by_alignment(scenes_by_rule: Mapping[str, Sequence[Scene]], better: Mapping[
     (first, base), *others = scenes_by_rule.items()
     found = []
     for rule, scenes in others:
-        at = {_place(s): s for s in scenes}
+        at = {s.place: s for s in scenes}
         for scene in base:
-            found += reversals(scene, at[_place(scene)], (first, rule), (better[first], better[rule]))
+            found += reversals(scene, at[scene.place], (first, rule), (better[first], better[rule]))
     return _ordered(found)
 
 
@@ -67,15 +67,15 @@ def by_protocol(scenes: Sequence[Scene], better: Better) -> list[Reversal]:
 
 def reversals(left: Scene, right: Scene, choices: tuple[str, str], better: tuple[Better, Better]) -> list[Reversal]:
     """Every pair of methods that changes its order by more than `MARGIN`, and beyond chance, on both sides."""
-    pairs = {_key(entry): [entry] for entry in left.entries if ended_well(entry)}
+    pairs = {entry.key: [entry] for entry in left.entries if ended_well(entry)}
     for entry in right.entries:
-        if _key(entry) in pairs and ended_well(entry):
-            pairs[_key(entry)].append(entry)
+        if entry.key in pairs and ended_well(entry):
+            pairs[entry.key].append(entry)
     both = sorted((pair for pair in pairs.values() if len(pair) == 2), key=lambda pair: _median(pair[0]))
-    under, against = better[0].get(_place(left), set()), better[1].get(_place(right), set())
+    under, against = better[0].get(left.place, set()), better[1].get(right.place, set())
     found = []
     for ahead, behind in combinations(both, 2):
-        a, b = _key(ahead[0]), _key(behind[0])
+        a, b = ahead[0].key, behind[0].key
         medians = _median(ahead[0]), _median(behind[0]), _median(ahead[1]), _median(behind[1])
         clear = (a, b) in under and (b, a) in against
         if clear and medians[1] > MARGIN * medians[0] and medians[2] > MARGIN * medians[3]:
@@ -88,14 +88,6 @@ def reversals(left: Scene, right: Scene, choices: tuple[str, str], better: tuple
 
 def _ordered(found: Sequence[Reversal]) -> list[Reversal]:
     return sorted(found, key=lambda r: not r.at_the_top)
-
-
-def _place(scene: Scene) -> Place:
-    return scene.dataset, scene.instance, scene.protocol
-
-
-def _key(entry: Entry) -> Configured:
-    return entry.method, entry.params
 
 
 def _median(entry: Entry) -> float:

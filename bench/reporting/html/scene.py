@@ -3,7 +3,8 @@
 import numpy as np
 
 from bench.core.problem import Floats
-from bench.reporting.html import figures, graph
+from bench.reporting.figures.looks import Looks, looks_by_selection
+from bench.reporting.html import graph
 from bench.reporting.html.case import Case, Solved, gather
 from bench.reporting.html.evidence import cost_section, cycle_section, roc_section
 from bench.reporting.html.folding import fold_section
@@ -19,10 +20,10 @@ WORST = 8  # cameras and edges that are listed
 def sections(store: Store, results: Results, place: Place) -> list[Section]:
     """Everything that can be said of a scene beyond its scores; empty where nothing ended well."""
     case = gather(store, results, place)
-    return [] if case is None else sections_of(case, figures.looks_by_selection(results.frame))
+    return [] if case is None else sections_of(case, looks_by_selection(results.frame))
 
 
-def sections_of(case: Case, looks: figures.Looks) -> list[Section]:
+def sections_of(case: Case, looks: Looks) -> list[Section]:
     """The same of what is known of it."""
     found = [*fold_section(case), *_graph_sections(case), *cycle_section(case)]
     return [*found, *roc_section(case, looks), *cost_section(case)]

@@ -5,14 +5,10 @@ a dictionary, which the page draws when it comes into view and offers as SVG and
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from bench.scoring.results import Place, Results
-from bench.storage.store import Store
+from bench.reporting.figures.paint_plotly import FigureDict
 
-FigureDict = Mapping[str, Any]  # {"data": [trace, …], "layout": {…}}
 Value = str | int | float | bool | None
 
 
@@ -64,9 +60,6 @@ class Section:
     paragraphs: tuple[str, ...] = ()
     figure: FigureDict | None = None
     tables: tuple[Table, ...] = ()
-
-
-SceneSections = Callable[[Store, Results, Place], Sequence[Section]]  # what `scene.sections` is
 
 
 def anchor(*names: str) -> str:

@@ -9,8 +9,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from bench.reporting.html.reversals import Reversal
-from bench.reporting.html.standing import Standing, geometric_mean
 from bench.reporting.tables.rows import Entry, Scene, degrees
+from bench.reporting.tables.standing import Standing, geometric_mean
 
 NEAR_DEG = 0.1  # a method this close to the leader's median, on every scene, is as good for most purposes
 FASTER = 2.0  # a ratio of packed times below this is not worth a sentence
@@ -29,7 +29,7 @@ def summary(scenes: Sequence[Scene], standings: Sequence[Standing], timed: bool 
 
 def what_was_compared(scenes: Sequence[Scene]) -> str:
     """Methods, scenes, rules and seeds."""
-    methods = len({(e.method, e.params) for s in scenes for e in s.entries})
+    methods = len({e.key for s in scenes for e in s.entries})
     protocols = list(dict.fromkeys(s.protocol for s in scenes))
     datasets = list(dict.fromkeys(s.dataset for s in scenes))
     seeds = max((e.seeds for s in scenes for e in s.entries), default=1)
@@ -69,7 +69,7 @@ def who_is_best(scenes: Sequence[Scene], standings: Sequence[Standing]) -> list[
 def leader(standings: Sequence[Standing]) -> Standing | None:
     """The method that is among the best on most scenes; of several the one with the lowest geometric mean."""
     candidates = [s for s in standings if s.best_on]
-    return min(candidates, key=lambda s: (-len(s.best_on), _last(s.median_deg), s.rank), default=None)
+    return min(candidates, key=lambda s: (-len(s.best_on), _last(s.median_deg), _last(s.rank)), default=None)
 
 
 def who_is_faster(scenes: Sequence[Scene], standings: Sequence[Standing], timed: bool = False) -> list[str]:
@@ -115,10 +115,9 @@ def what_failed(scenes: Sequence[Scene]) -> str:
     kinds: Counter[str] = Counter()
     methods: dict[str, dict[str, None]] = {}
     for entry in (e for s in scenes for e in s.entries):
-        for status, times in entry.failures.items():
-            kind = kind_of(status)
-            kinds[kind] += times
-            methods.setdefault(kind, {})[entry.label] = None
+        for failed in entry.failures:
+            kinds[failed.outcome] += failed.seeds
+            methods.setdefault(failed.outcome, {})[entry.label] = None
     if not kinds:
         return f"All {jobs} jobs ended well." if jobs > 1 else "The job ended well."
     parts = [f"{kind} {times} ({enumeration(list(methods[kind]))})" for kind, times in kinds.most_common()]
@@ -208,11 +207,6 @@ def enumeration(names: Sequence[str]) -> str:
 def spoken(scene: Scene) -> str:
     """Name of a scene in prose."""
     return scene.instance.replace("_", " ")
-
-
-def kind_of(status: str) -> str:
-    """The word of the vocabulary in a status: ``error`` in ``error(KeyError: …)``."""
-    return status.partition("(")[0]
 
 
 def _known(scenes: Iterable[Scene]) -> list[Scene]:

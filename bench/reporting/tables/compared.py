@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
+from bench.plugins.selection import label
 from bench.reporting.tables.grid import ABSENT, Cell, Grid
 from bench.reporting.tables.rows import degrees, exact_seconds
 from bench.scoring.comparison import IDENTICAL, TIME, Comparison
@@ -64,8 +65,7 @@ def _row(row: "object") -> tuple[tuple[str, ...], tuple[Cell, ...]]:
 
 
 def _label(row: "object") -> str:
-    method, params = str(row.method), str(row.params)  # type: ignore[attr-defined]
-    return f"{method}[{params}]" if params else method
+    return label(str(row.method), str(row.params))  # type: ignore[attr-defined]
 
 
 def _legend(found: Comparison, threshold: float) -> Iterator[str]:

@@ -17,7 +17,6 @@ from bench.reporting.tables.rows import (
     Entry,
     Scene,
     Ties,
-    Value,
     area,
     degrees,
     exact_seconds,
@@ -136,7 +135,7 @@ def _empty_table() -> Table:
 
 
 def _cell(entry: Entry, name: str, timed: bool) -> str:
-    value = entry.values.get(name, Value(math.nan))
+    value = entry.value(name)
     if name == "speedup":
         return speedup(entry)
     if timed and name in ("solve_s", "min_s"):

@@ -14,7 +14,6 @@ from bench.reporting import appearance
 from bench.reporting.tables.rows import (
     ROC_LEGEND,
     TIE_LEGEND,
-    Configured,
     Entry,
     Scene,
     Ties,
@@ -25,6 +24,7 @@ from bench.reporting.tables.rows import (
     speedup,
     times_note,
 )
+from bench.scoring.results import Configured
 
 ABBREVIATIONS = {
     "timeout": "TO",
@@ -118,10 +118,8 @@ def _grid(group: Sequence[Scene], timing: str) -> Grid:
     shown = [(n, f) for n, f in columns if any(f(s) != ABSENT for s in group)]
     rows = []
     for scene in group:
-        by_method = {(e.method, e.params): e for e in scene.entries}
-        cells = tuple(_cell(scene, by_method.get(method)) for method in methods)
-        rows.append((tuple(fact(scene) for _, fact in shown), cells))
-        entries = [by_method.get(method) for method in methods]
+        entries = [scene.entry(method) for method in methods]
+        rows.append((tuple(fact(scene) for _, fact in shown), tuple(_cell(scene, entry) for entry in entries)))
         further = [(TIME, _time), (FASTER, speedup)] if timing else []
         further += [(ROC, _area)] if scene.has_roc else []
         for label, of in further:
@@ -141,7 +139,7 @@ def _grid(group: Sequence[Scene], timing: str) -> Grid:
 
 def _methods(group: Sequence[Scene]) -> dict[Configured, tuple[str, str]]:
     """Title and parameters of every configured method; the id is added where two share both."""
-    titles = {(e.method, e.params): e.title for scene in group for e in scene.entries}
+    titles = {e.key: e.title for scene in group for e in scene.entries}
     heads = {key: appearance.current().head(*key, title) for key, title in titles.items()}
     shown = list(heads.values())
     return {key: head if shown.count(head) == 1 else (f"{head[0]} ({key[0]})", head[1]) for key, head in heads.items()}
@@ -151,7 +149,7 @@ def _cell(scene: Scene, entry: Entry | None) -> Cell:
     if entry is None:
         return Cell(ABSENT)
     if not entry.ok:
-        return Cell("/".join(dict.fromkeys(abbreviated(status) for status in entry.failures)))
+        return Cell("/".join(ABBREVIATIONS.get(ended, ended) for ended in entry.outcomes))
     if not scene.has_truth:
         return Cell(UNKNOWN)
     mean, median = (_short(entry.values[name].mean) for name in ("mean_deg", "median_deg"))
@@ -165,7 +163,7 @@ def _time(entry: Entry) -> str:
 
 
 def _area(entry: Entry) -> str:
-    return area(entry.roc_auc.mean)
+    return area(entry.value("roc_auc").mean)
 
 
 def _short(value: float) -> str:

@@ -1,15 +1,14 @@
 """Confidence intervals of every row of a scored run."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from bench.core.problem import Floats
-from bench.reporting.tables.rows import Configured, Place
 from bench.scoring.inference.resampling import Statistic
 from bench.scoring.inference.statistics import MIN_CAMERAS, confidence_interval
+from bench.scoring.results import CONFIGURED, PLACE, Configured, Place
 
 STATISTICS: tuple[Statistic, ...] = ("mean", "median")
 
@@ -21,14 +20,10 @@ def with_intervals(frame: pd.DataFrame, errors: Mapping[Place, Mapping[Configure
     """
     waiting = {(place, key): iter(several) for place, own in errors.items() for key, several in own.items()}
     ends = [
-        _ends(next(waiting.get((_place(row), (row["method"], row["params"])), iter(())), None))
-        for row in frame.to_dict("records")
+        _ends(next(waiting.get((key[:3], key[3:]), iter(())), None))
+        for key in zip(*(map(str, frame[name]) for name in (*PLACE, *CONFIGURED)), strict=True)
     ]
     return frame.assign(**pd.DataFrame(ends, index=frame.index))
-
-
-def _place(row: Mapping[str, Any]) -> Place:
-    return row["dataset"], row["instance"], row["protocol"]
 
 
 def _ends(errors: Floats | None) -> dict[str, float]:

@@ -16,6 +16,7 @@ COLUMNS = (
     "seed",
     "protocol",
     "alignment",
+    "outcome",
     "status",
     "mean_deg",
     "median_deg",

@@ -1,19 +1,21 @@
 """What a table says of each scene: one entry for each configured method, its seeds drawn together."""
 
 import math
+from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Set
 from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 
+from bench.core import outcome
+from bench.plugins.selection import label
 from bench.scoring.inference.statistics import seed_half_width
+from bench.scoring.results import Configured, Place
 
-Place = tuple[str, str, str]  # dataset, instance, protocol
-Configured = tuple[str, str]  # method, params
 Ties = Mapping[Place, Set[Configured]]
 
-OK = "ok"
+OK = outcome.OK
 BUSY = 0.05  # of the time of a solution spent waiting for the core, from which on a table says so
 TIE_LEGEND = (
     "not told apart from the best median, nor by the mean (paired bootstrap over cameras and seeds, level 5 %, "
@@ -35,6 +37,15 @@ class Value:
 
 
 @dataclass(frozen=True)
+class Failed:
+    """How seeds ended that did not end well: the bare outcome, the status with its reason, and how many did."""
+
+    outcome: str
+    status: str
+    seeds: int
+
+
+@dataclass(frozen=True)
 class Entry:
     """A configured method on a scene.
 
@@ -49,7 +60,7 @@ class Entry:
     seeds, ok
         How many were planned and how many ended well.
     failures
-        How often each status other than ok occurred.
+        Every status other than ok.
     notes
         What the method or the harness noted, such as fallbacks.
     best
@@ -64,26 +75,35 @@ class Entry:
     scored: int
     seeds: int
     ok: int
-    failures: Mapping[str, int]
+    failures: tuple[Failed, ...]
     notes: tuple[str, ...]
     best: bool
 
     @property
-    def label(self) -> str:
-        """The selection that runs it: ``shonan[loss=huber]``."""
-        return f"{self.method}[{self.params}]" if self.params else self.method
+    def key(self) -> Configured:
+        """The configured method."""
+        return self.method, self.params
 
     @property
-    def roc_auc(self) -> Value:
-        """Area under the ROC curve of the edge weights."""
-        return self.values.get("roc_auc", Value(math.nan))
+    def label(self) -> str:
+        """The selection that runs it: ``shonan[loss=huber]``."""
+        return label(self.method, self.params)
+
+    @property
+    def outcomes(self) -> tuple[str, ...]:
+        """The outcomes other than ok, each once."""
+        return tuple(dict.fromkeys(failed.outcome for failed in self.failures))
+
+    def value(self, name: str) -> Value:
+        """What a column of the frame says of it, unknown where there is none."""
+        return self.values.get(name, Value(math.nan))
 
     @property
     def failure(self) -> str:
         """Every status other than ok, with how many seeds it took where there are several."""
         if self.seeds == 1:
-            return "; ".join(self.failures)
-        return "; ".join(f"{status} ({count} of {self.seeds} seeds)" for status, count in self.failures.items())
+            return "; ".join(failed.status for failed in self.failures)
+        return "; ".join(f"{failed.status} ({failed.seeds} of {self.seeds} seeds)" for failed in self.failures)
 
 
 @dataclass(frozen=True)
@@ -100,6 +120,15 @@ class Scene:
     entries: tuple[Entry, ...]
 
     @property
+    def place(self) -> Place:
+        """Where its errors are found."""
+        return self.dataset, self.instance, self.protocol
+
+    def entry(self, method: Configured) -> Entry | None:
+        """What a configured method did on it, if it was planned."""
+        return next((e for e in self.entries if e.key == method), None)
+
+    @property
     def has_truth(self) -> bool:
         """Whether any entry was scored; True where nothing ended well, because that is not known then."""
         return any(e.scored for e in self.entries) or not any(e.ok for e in self.entries)
@@ -107,7 +136,7 @@ class Scene:
     @property
     def has_roc(self) -> bool:
         """Whether the edge weights of any entry could be held against the true outliers."""
-        return any(e.roc_auc.known for e in self.entries)
+        return any(e.value("roc_auc").known for e in self.entries)
 
 
 _VALUES = (
@@ -153,8 +182,8 @@ def scenes(frame: pd.DataFrame, ties: Ties) -> list[Scene]:
 
 def _entry(rows: pd.DataFrame, tied: Set[Configured]) -> Entry:
     method, title, params = (str(rows[name].iloc[0]) for name in ("method", "title", "params"))
-    ok = rows[rows["status"] == OK]
-    failed = rows.loc[rows["status"] != OK, "status"]
+    well = rows["outcome"] == OK
+    ok, failed = rows[well], Counter(zip(rows.loc[~well, "outcome"], rows.loc[~well, "status"], strict=True))
     notes = rows["notes"].fillna("") if "notes" in rows else pd.Series(dtype=str)
     return Entry(
         method,
@@ -165,7 +194,7 @@ def _entry(rows: pd.DataFrame, tied: Set[Configured]) -> Entry:
         scored=_whole(ok["n_scored"]),
         seeds=len(rows),
         ok=len(ok),
-        failures={str(status): int(count) for status, count in failed.value_counts(sort=False).items()},
+        failures=tuple(Failed(str(kind), str(status), seeds) for (kind, status), seeds in failed.items()),
         notes=tuple(dict.fromkeys(note for note in map(str, notes) if note)),
         best=(method, params) in tied,
     )
@@ -224,7 +253,7 @@ def times_note(frame: pd.DataFrame) -> str:
 
 def speedup(entry: Entry) -> str:
     """Ratio to the baseline as a table prints it, with its range."""
-    ratio, low, high = (entry.values.get(f"speedup{end}", Value(math.nan)).mean for end in ("", "_low", "_high"))
+    ratio, low, high = (entry.value(f"speedup{end}").mean for end in ("", "_low", "_high"))
     return f"{ratio:.3g} ({low:.3g} to {high:.3g})" if math.isfinite(ratio) else "–"
 
 

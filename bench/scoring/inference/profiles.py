@@ -1,15 +1,11 @@
 """Performance profiles (Dolan and More, Mathematical Programming 91, 2002)."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.core.problem import Floats
 from bench.scoring.inference.blocks import Blocks, Configured
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +43,3 @@ def _profile(method: Configured, ratios: Floats) -> Profile:
     if not len(steps) or steps[0] > 1:
         steps, counts = np.concatenate([[1.0], steps]), np.concatenate([[0], counts])
     return Profile(method, steps, np.cumsum(counts) / len(ratios))
-
-
-def profile_frame(profiles: list[Profile]) -> "pd.DataFrame":
-    """``method, params, ratio, share``, a row for each step."""
-    import pandas as pd
-
-    rows = [
-        {"method": p.method[0], "params": p.method[1], "ratio": float(ratio), "share": float(share)}
-        for p in profiles
-        for ratio, share in zip(p.ratios, p.shares, strict=True)
-    ]
-    return pd.DataFrame(rows)

@@ -1,22 +1,14 @@
 """Who comes first over many problems, and how sure that is: ranks, their probabilities, Friedman and post-hoc tests."""
 
 from dataclasses import dataclass
-from itertools import combinations
-from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from bench.core.problem import Floats
 from bench.scoring.inference.blocks import Blocks, Configured
-from bench.scoring.inference.difference import LEVEL, holm
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-PostHoc = Literal["nemenyi", "wilcoxon"]
+from bench.scoring.inference.difference import LEVEL
 
 RESAMPLES = 2000
-FAILED = 1e12  # beyond any error or time: two failures are equal
 
 
 def ranks(values: Floats) -> Floats:
@@ -24,6 +16,14 @@ def ranks(values: Floats) -> Floats:
     from scipy.stats import rankdata
 
     return np.asarray(rankdata(values, axis=1))
+
+
+def mean_ranks(blocks: Blocks) -> Floats:
+    """(k,) mean rank of each method: over the problems of a scene, then over the scenes; NaN without problems."""
+    if not len(blocks.values):
+        return np.full(len(blocks.methods), np.nan)
+    found: Floats = blocks.weights @ ranks(blocks.values)
+    return found
 
 
 def rank_probabilities(blocks: Blocks) -> Floats:
@@ -65,7 +65,7 @@ class CriticalDifference:
     methods
         (k,) by mean rank, the best first.
     mean_ranks
-        (k,) over the problems.
+        (k,) see `mean_ranks`.
     problems
         How many.
     friedman_p
@@ -73,7 +73,7 @@ class CriticalDifference:
     critical_difference
         Of mean ranks, by Nemenyi's test.
     p_values
-        (k, k) of pairs of methods: Nemenyi's, or Wilcoxon's signed ranks after Holm's correction.
+        (k, k) of pairs of methods, Nemenyi's.
     groups
         First and last position of each longest run of methods of which no two are told apart.
     """
@@ -87,47 +87,53 @@ class CriticalDifference:
     groups: tuple[tuple[int, int], ...]
 
 
-def critical_difference(blocks: Blocks, post_hoc: PostHoc = "nemenyi", level: float = LEVEL) -> CriticalDifference:
-    """Friedman's test and, where it finds a difference, pairwise tests after it.
+def critical_difference(blocks: Blocks, level: float = LEVEL) -> CriticalDifference:
+    """Friedman's test and, where it finds a difference, Nemenyi's of each pair.
 
-    Nemenyi's test compares mean ranks with the studentized range and so depends on which other methods take part;
-    Wilcoxon's signed ranks with Holm's correction do not (Benavoli, Corani and Mangili, JMLR 17, 2016), but cannot tell
-    anything from fewer than six problems.
+    Nemenyi's test compares mean ranks with the studentized range and so depends on which other methods take part. Mean
+    ranks in which problems weigh differently vary as if they were of fewer: of ``1 / sum(weights^2)`` (Kish 1965).
 
     Parameters
     ----------
     blocks
         At least two methods and problems.
-    post_hoc
-        The pairwise test.
     level
         Of all tests.
     """
-    own = ranks(blocks.values)
-    order = np.argsort(own.mean(axis=0), kind="stable")
-    own, values = own[:, order], blocks.values[:, order]
-    mean, problems = own.mean(axis=0), len(own)
-    friedman = friedman_p(own)
-    p = _nemenyi(mean, problems) if post_hoc == "nemenyi" else _wilcoxon(values)
+    mean = mean_ranks(blocks)
+    order = np.argsort(mean, kind="stable")
+    mean, own = mean[order], ranks(blocks.values)[:, order]
+    effective = 1 / float((blocks.weights**2).sum())
+    friedman = friedman_p(own, blocks.weights)
+    p = _nemenyi(mean, effective)
     together = np.ones_like(p, dtype=bool) if not friedman < level else ~(p < level)
     return CriticalDifference(
         methods=tuple(blocks.methods[k] for k in order),
         mean_ranks=mean,
-        problems=problems,
+        problems=len(own),
         friedman_p=friedman,
-        critical_difference=_nemenyi_difference(len(mean), problems, level),
+        critical_difference=_nemenyi_difference(len(mean), effective, level),
         p_values=p,
         groups=tuple(_runs(together)),
     )
 
 
-def friedman_p(own: Floats) -> float:
-    """P value of Friedman's test in the form of Iman and Davenport (1980), from ranks (problems, methods) with ties."""
+def friedman_p(own: Floats, weights: Floats) -> float:
+    """P value of Friedman's test in the form of Iman and Davenport (1980).
+
+    Parameters
+    ----------
+    own
+        (b, k) ranks, with ties.
+    weights
+        (b,) shares of the problems, which sum to one.
+    """
     from scipy.special import fdtrc
 
-    problems, methods = own.shape
-    between = problems * ((own.mean(axis=0) - (methods + 1) / 2) ** 2).sum()
-    within = ((own - (methods + 1) / 2) ** 2).sum() / (problems * (methods - 1))
+    methods = own.shape[1]
+    problems = 1 / float((weights**2).sum())
+    between = problems * ((weights @ own - (methods + 1) / 2) ** 2).sum()
+    within = (weights @ (own - (methods + 1) / 2) ** 2).sum() / (methods - 1)
     if within == 0:
         return 1.0
     chi = between / within
@@ -137,35 +143,21 @@ def friedman_p(own: Floats) -> float:
     return float(fdtrc(methods - 1, (methods - 1) * (problems - 1), (problems - 1) * chi / left))
 
 
-def _nemenyi_difference(methods: int, problems: int, level: float) -> float:
+def _nemenyi_difference(methods: int, problems: float, level: float) -> float:
     from scipy.stats import studentized_range
 
     return float(studentized_range.ppf(1 - level, methods, np.inf)) * _error(methods, problems)
 
 
-def _nemenyi(mean: Floats, problems: int) -> Floats:
+def _nemenyi(mean: Floats, problems: float) -> Floats:
     from scipy.stats import studentized_range
 
     apart = np.abs(mean[:, None] - mean) / _error(len(mean), problems)
     return np.asarray(studentized_range.sf(apart, len(mean), np.inf))
 
 
-def _error(methods: int, problems: int) -> float:
+def _error(methods: int, problems: float) -> float:
     return float(np.sqrt(methods * (methods + 1) / (12 * problems)))
-
-
-def _wilcoxon(values: Floats) -> Floats:
-    from scipy.stats import wilcoxon
-
-    count = values.shape[1]
-    pairs = list(combinations(range(count), 2))
-    logs = np.log(np.minimum(values, FAILED))
-    differences = [logs[:, i] - logs[:, j] for i, j in pairs]
-    raw = [float(wilcoxon(d, method="auto").pvalue) if d.any() else 1.0 for d in differences]
-    p = np.ones((count, count))
-    for (i, j), value in zip(pairs, holm(raw), strict=True):
-        p[i, j] = p[j, i] = value
-    return p
 
 
 def _runs(together: "np.ndarray[tuple[int, int], np.dtype[np.bool_]]") -> list[tuple[int, int]]:
@@ -178,17 +170,3 @@ def _runs(together: "np.ndarray[tuple[int, int], np.dtype[np.bool_]]") -> list[t
         if last > first and (not found or last > found[-1][1]):
             found.append((first, last))
     return found
-
-
-def rank_frame(blocks: Blocks) -> "pd.DataFrame":
-    """``method, params, mean_rank, p_rank_1 ... p_rank_k``, by mean rank over scenes: what a heat strip shows."""
-    import pandas as pd
-
-    mean = np.mean([own.mean(axis=0) for own in _by_scene(blocks)], axis=0)
-    probabilities = rank_probabilities(blocks)
-    heads = [f"p_rank_{place}" for place in range(1, len(mean) + 1)]
-    rows = [
-        {"method": method, "params": params, "mean_rank": float(mean[k]), **dict(zip(heads, own, strict=True))}
-        for k, ((method, params), own) in enumerate(zip(blocks.methods, probabilities.tolist(), strict=True))
-    ]
-    return pd.DataFrame(rows).sort_values("mean_rank", kind="stable", ignore_index=True)

@@ -9,7 +9,8 @@ from matplotlib.lines import Line2D
 
 from bench.papers.kinds.curves.grid import notes
 from bench.papers.kinds.curves.plot import CurvePlot, Curves, Point
-from bench.reporting.figures.style import COLORS, LINES, Look, describe, log_axis, panels, styled
+from bench.reporting.figures.looks import COLORS, LINES, Look
+from bench.reporting.figures.style import describe, log_axis, panels, styled
 
 REFERENCE = "#000000"
 TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)

@@ -24,7 +24,7 @@
   const board = data("leaderboard");
   const best = new Set(board.best);
   const decode = (value, k) => board.columns[k].values?.[value] ?? (board.columns[k].values ? null : value);
-  const rows = board.rows.map((values, k) => ({ values: values.map(decode), best: best.has(k) }));
+  const rows = board.rows.map((values, k) => ({ values: values.map(decode), best: best.has(k), failed: board.failed[k] ?? [] }));
   const at = Object.fromEntries(board.columns.map((column, k) => [column.key, k]));
   const get = (row, key) => (key in at ? row.values[at[key]] : null);
   const digits = (value, three) => (value >= 100 ? value.toFixed(0) : value.toFixed(value >= 10 ? three - 2 : value >= 1 ? three - 1 : three));
@@ -39,7 +39,6 @@
   const form = document.getElementById("filters");
   const table = document.getElementById("board");
   const distinct = (key) => [...new Set(rows.map((row) => get(row, key)))];
-  const kind = (outcome) => String(outcome).split(/[ (;]/)[0];
   let order = { key: "rank", down: false };
   let shown = [];
 
@@ -49,10 +48,10 @@
     select.parentElement.hidden = values.length < 2;
   };
   const any = (key) => distinct(key).map((value) => [value, value]);
-  const failures = distinct("outcome").filter((text) => text !== "ok").map(kind).filter((word) => word !== "ok");
+  const failures = [...new Set(rows.flatMap((row) => row.failed))];
   options("scene", [...any("scene"), ["", "Each scene"]], rows.length ? get(rows[0], "scene") : "");
   options("method", [["", "All methods"], ...any("method")], "");
-  options("outcome", [["", "Any outcome"], ["ok", "ok"], ["failed", "not ok"], ...[...new Set(failures)].map((word) => [word, word])], "");
+  options("outcome", [["", "Any outcome"], ["ok", "ok"], ["failed", "not ok"], ...failures.map((word) => [word, word])], "");
   options("alignment", [...any("alignment"), ["", "All alignments"]].slice(0, distinct("alignment").length > 1 ? undefined : 1), distinct("alignment")[0]);
   options("protocol", [...any("protocol"), ["", "All protocols"]].slice(0, distinct("protocol").length > 1 ? undefined : 1), "");
   if (distinct("protocol").length > 1) form.elements.protocol.value = "";
@@ -60,8 +59,7 @@
   const matches = (row) => {
     const chosen = (key) => form.elements[key].value;
     const same = ["scene", "method", "alignment", "protocol"].every((key) => !chosen(key) || get(row, key) === chosen(key));
-    const outcome = get(row, "outcome");
-    const ended = { "": true, ok: outcome === "ok", failed: outcome !== "ok" }[chosen("outcome")] ?? outcome.includes(chosen("outcome"));
+    const ended = { "": true, ok: !row.failed.length, failed: row.failed.length > 0 }[chosen("outcome")] ?? row.failed.includes(chosen("outcome"));
     const words = chosen("text").toLowerCase().split(/\s+/).filter(Boolean);
     const text = ["method", "scene", "outcome", "protocol"].map((key) => get(row, key)).join(" ").toLowerCase();
     return same && ended && words.every((word) => text.includes(word));
@@ -187,7 +185,6 @@
   const decoded = (value) => (typeof value === "string" ? value.replaceAll("&lt;", "<").replaceAll("&amp;", "&") : value);
   const longTable = ({ data: traces, layout }) => {
     const title = (axis) => layout[axis]?.title?.text;
-    const shared = layout.template?.data?.scatter?.[0] ?? {};
     const names = { x: title("xaxis") ?? "x", y: title("yaxis") ?? "y" };
     const records = [];
     for (const trace of traces) {
@@ -202,7 +199,6 @@
       const length = Math.max(0, ...arrays.map(([, values]) => values.length));
       for (let i = 0; i < length; i++) {
         const record = { series: trace.name };
-        if (shared.dy && !trace.y) record[names.y] = shared.y0 + i * shared.dy;
         for (const [key, values] of arrays) record[names[key] ?? key] = values[i];
         records.push(record);
       }
