@@ -85,6 +85,17 @@ def test_worse_better_and_neither(scenes: int) -> None:
     assert "worse: a" in verdict(found)
 
 
+def test_p_values_pay_for_the_others_of_their_level_and_for_three_levels() -> None:
+    """Two quantities overall, four over the scenes of two methods, sixteen on four scenes: the smallest pays for all."""
+    found = compare(scored({"a": 1.0, "b": 1.0}, draw=1), scored({"a": 1.1, "b": 1.0}, draw=2))
+    for level, count in (("all", 2), ("method", 4), ("scene", 16)):
+        rows = found.rows[found.rows["level"] == level].sort_values("p_value")
+        assert len(rows) == count
+        raw, paid = rows[["p_value", "p_holm"]].iloc[0]
+        assert raw < 1 / (3 * count)
+        assert paid == pytest.approx(3 * count * raw)
+
+
 def test_the_threshold_says_what_is_no_regression() -> None:
     found = compare(scored({"a": 1.0}, 8), scored({"a": 1.2}, 8), threshold=1.5)
     assert verdicts(found) == {"a": {"cannot be told"}}
