@@ -86,7 +86,7 @@ def test_worse_better_and_neither(scenes: int) -> None:
 
 
 def test_p_values_pay_for_the_others_of_their_level_and_for_three_levels() -> None:
-    """Two quantities overall, four over the scenes of two methods, sixteen on four scenes: the smallest pays for all."""
+    """Two quantities overall, four of two methods, sixteen on their four scenes: the smallest pays for all of them."""
     found = compare(scored({"a": 1.0, "b": 1.0}, draw=1), scored({"a": 1.1, "b": 1.0}, draw=2))
     for level, count in (("all", 2), ("method", 4), ("scene", 16)):
         rows = found.rows[found.rows["level"] == level].sort_values("p_value")
