@@ -160,6 +160,9 @@ class TestSummary:
         assert [found[f"within_{k}_deg"] for k in (1, 3, 5, 10, 30)] == [0.25, 0.5, 0.75, 1, 1]
         assert found["n_scored"] == 4
 
+    def test_a_share_under_an_angle_does_not_hold_the_angle(self):
+        assert summary(np.array([4.9, 5.0]))["within_5_deg"] == 0.5
+
     def test_nothing_scored_has_the_same_keys(self):
         found = summary(np.full(3, np.nan))
         assert found.keys() == summary(np.ones(3)).keys()
@@ -375,6 +378,12 @@ def test_with_many_seeds_the_seeds_alone_tell_who_ties(rng):
     easy[hard > np.quantile(hard, 0.9), 1:] = np.nan, np.nan, 0
     found = tied_by_seed({"one": rows(1.0), "twin": rows(1.0), "worse": rows(1.05), "easy": easy})
     assert found == {"one", "twin"}
+
+
+def test_with_many_seeds_the_mean_tells_what_the_median_hides(rng):
+    medians = rng.lognormal(0, 0.2, 300)
+    whole, torn = (np.stack([np.arange(300), medians, k * medians, np.full(300, 20)], axis=1) for k in (1, 2))
+    assert tied_by_seed({"whole": whole, "torn": torn}) == {"whole"}
 
 
 def test_with_many_seeds_false_alarms_are_rare(rng):
