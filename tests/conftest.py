@@ -13,6 +13,29 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a command in the background: its children would not hear Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+
+class Failures:
+    """Prints what failed as it fails, under xdist too: a run takes minutes, and pytest itself tells at its end."""
+
+    def __init__(self, terminal: pytest.TerminalReporter) -> None:
+        self.terminal = terminal
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """One line for a failure: the test, where it failed, and the first line of why."""
+        if report.failed:
+            crash = getattr(report.longrepr, "reprcrash", None)
+            why = f"{crash.path}:{crash.lineno}: {crash.message}" if crash else str(report.longrepr)
+            self.terminal.ensure_newline()
+            self.terminal.write_line(f"FAILED {report.nodeid} ({report.when}) {why.strip().splitlines()[0]}", red=True)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Tell failures where there is a terminal, which the workers of xdist do not have."""
+    if terminal := config.pluginmanager.get_plugin("terminalreporter"):
+        config.pluginmanager.register(Failures(terminal))
+
+
 REAL_DATA = Path(__file__).parent.parent.parent / "shared" / "data"
 
 

@@ -35,6 +35,8 @@ from bench.suite.plan import Job, Plan, encode
 
 Read = Callable[[bytes, Path], object]
 
+CORPUS = Path(__file__).parent / "corpus"  # what once failed, by parser
+
 
 @dataclass(frozen=True)
 class Parser:
@@ -57,6 +59,13 @@ class Parser:
     read: Read
     container: str = "plain"
     names_file: bool = True
+
+
+def complaint(message: str, file: str) -> str:
+    """What is wrong with a refusal, or nothing."""
+    if "\n" in message or len(message) > 3000:
+        return f"the message is not one line: {message[:30]!r}"
+    return "" if file in message else f"the message does not name the file: {message[:30]!r}"
 
 
 def _file(name: str, read: Callable[[Path], object]) -> Read:

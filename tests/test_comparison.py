@@ -10,12 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from commands import bench
+from scipy import stats
 
 from bench.core import so3
 from bench.core.errors import InputError
 from bench.reporting.tables.compared import comparison_grid, verdict
 from bench.scoring.comparison import Comparison, compare
-from bench.scoring.inference.ratio import Ratio, mean_ratio, time_ratio
+from bench.scoring.inference.ratio import Ratio, error_ratio, mean_ratio, time_ratio
 from bench.scoring.metrics.errors import summary
 from bench.scoring.results import Results
 from bench.storage.arrays import load_estimate
@@ -85,6 +86,37 @@ def test_worse_better_and_neither(scenes: int) -> None:
     assert "worse: a" in verdict(found)
 
 
+def test_p_values_pay_for_the_others_of_their_level_and_for_three_levels() -> None:
+    """Two quantities overall, four of two methods, sixteen on their four scenes: the smallest pays for all of them."""
+    found = compare(scored({"a": 1.0, "b": 1.0}, draw=1), scored({"a": 1.1, "b": 1.0}, draw=2))
+    for level, count in (("all", 2), ("method", 4), ("scene", 16)):
+        rows = found.rows[found.rows["level"] == level].sort_values("p_value")
+        assert len(rows) == count
+        raw, paid = rows[["p_value", "p_holm"]].iloc[0]
+        assert raw < 1 / (3 * count)
+        assert paid == pytest.approx(3 * count * raw)
+
+
+def test_what_is_identical_costs_the_others_nothing() -> None:
+    old, new = {"a": 1.0, "b": 1.0}, {"a": 1.1, "b": 1.0}
+    alone, beside = (
+        compare(scored({k: old[k] for k in names}), scored({k: new[k] for k in names})).rows for names in ("a", "ab")
+    )
+    for level in ("method", "scene"):
+        paid = [rows[(rows["level"] == level) & (rows["method"] == "a")]["p_holm"].tolist() for rows in (alone, beside)]
+        assert paid[0] == paid[1]
+
+
+def test_seeds_with_an_instance_each_are_a_t_test() -> None:
+    old, new = scored({"a": 1.0}, 1, seeds=6, draw=1), scored({"a": 1.1}, 1, seeds=6, draw=2)
+    place = ("d", "s0", "all")
+    logs = [[np.log(np.median(errors)) for errors in run.errors[place]["a", ""]] for run in (new, old)]
+    expected = stats.ttest_rel(*logs).confidence_interval(0.95)
+    rows = compare(old, new).rows.set_index(["level", "quantity"])
+    found = rows.loc[("scene", "median")]
+    assert (found["low"], found["high"]) == pytest.approx((np.exp(expected.low), np.exp(expected.high)))
+
+
 def test_the_threshold_says_what_is_no_regression() -> None:
     found = compare(scored({"a": 1.0}, 8), scored({"a": 1.2}, 8), threshold=1.5)
     assert verdicts(found) == {"a": {"cannot be told"}}
@@ -128,6 +160,8 @@ def test_outcomes() -> None:
     ]
     assert [outcome.worse for outcome in found.outcomes] == [False, True, True, True]
     assert found.regressed
+    more = compare(new, old).outcomes
+    assert [outcome.worse for outcome in more] == [True, False, False, False]
 
 
 def test_what_is_not_compared_is_said() -> None:
@@ -161,7 +195,11 @@ def test_ratios() -> None:
     assert mean_ratio([Ratio(2.0), Ratio(0.5)]).value == pytest.approx(1)
     found = time_ratio(np.array([2.0, 2.2, 1.8]), np.array([1.0, 1.1, 0.9]))
     assert found.low < found.value < found.high
+    assert found.p_value == pytest.approx(stats.ttest_ind(np.log([2.0, 2.2, 1.8]), np.log([1.0, 1.1, 0.9])).pvalue)
     assert np.isnan(mean_ratio([]).value)
+    few = error_ratio(np.full((1, 5), 2.0), np.full((1, 5), 1.0), "mean", same_cameras=True)
+    assert few.value == pytest.approx(2)
+    assert np.isnan([few.low, few.high, few.p_value]).all()
 
 
 def worsened(run: Path, copy: Path) -> Path:

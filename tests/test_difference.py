@@ -36,6 +36,8 @@ def test_samples_without_spread_are_decided_by_their_difference() -> None:
     assert (below.p_below, below.p_above) == (0, 1)
     same = paired(np.full(4, 1.0), np.full(4, 1.0))
     assert (same.p_below, same.p_above) == (1, 1)
+    within = paired(np.full(4, 2.0), np.full(4, 1.0), margin=1.5)
+    assert (within.p_below, within.p_above) == (0, 1)
 
 
 @pytest.mark.parametrize("test", [paired, unpaired])

@@ -124,6 +124,15 @@ def test_a_fold_is_found_with_its_cameras_and_its_angle(n: int, noise_deg: float
     assert fold.main_spread_deg == pytest.approx(1.54 * noise_deg, rel=0.35)
 
 
+def test_a_fold_may_be_far_less_precise_than_the_rest() -> None:
+    rng = np.random.default_rng(0)
+    truth, estimate = estimated(0, 300, 0.5)
+    estimate[:60] = estimate[:60] @ so3.exp(np.radians(3.0) * rng.standard_normal((60, 3)))
+    (fold,) = find_folds(folded(estimate, truth, np.arange(60)), truth)
+    np.testing.assert_array_equal(fold.cameras, np.arange(60))
+    assert fold.spread_deg > 4 * fold.main_spread_deg
+
+
 def test_two_folds_are_told_apart_and_unsolved_cameras_are_left_out() -> None:
     truth, estimate = estimated(0, 300, 1.0)
     estimate = folded(estimate, truth, np.arange(100, 150))
@@ -173,6 +182,10 @@ def test_folds_of_several_methods_are_put_together() -> None:
     np.testing.assert_array_equal(both.cameras, np.arange(30))
     np.testing.assert_array_equal(alone.cameras, np.arange(50, 60))
     assert shared_folds({"a": []}) == []
+    one, other = shared_folds({"a": [fold(range(10), 0.2)], "b": [fold(range(5, 20), 0.2)]})
+    assert (list(one.folds), list(other.folds)) == (["b"], ["a"])
+    (three,) = shared_folds({"a": [fold(range(10), 0.2)], "b": [fold(range(9), 0.2)], "c": [fold(range(12), 0.2)]})
+    np.testing.assert_array_equal(three.cameras, np.arange(10))
 
 
 # --- both together -----------------------------------------------------------------------------------

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzz import CORPUS, complaint
+from damage import damaged
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mutation import mutated
-from parsers import PARSERS
+from parsers import CORPUS, PARSERS, complaint
 
 from bench.core.errors import InputError
 from bench.formats import read_graph
@@ -46,8 +45,7 @@ def test_what_is_whole_is_read(name: str, tmp_path: Path) -> None:
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(number=st.integers(0, 2**63))
 def test_a_damaged_file_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, name: str, number: int) -> None:
-    rng, parser = random.Random(number), PARSERS[name]
-    data = mutated(rng.choice(parser.seeds), rng.choice(parser.seeds), parser.container, rng)
+    data = damaged(PARSERS[name].seeds, PARSERS[name].container, random.Random(number))
     read(name, data, folder_of(tmp_path_factory, name))
 
 
@@ -72,8 +70,8 @@ def folder_of(factory: pytest.TempPathFactory, name: str) -> Path:
 
 def test_the_fuzzer_finds_what_is_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A parser that fails at one byte, hangs at another and allocates at a third is found out."""
-    import fuzz
     import parsers
+    from tools import fuzz
 
     def bad(data: bytes, folder: Path) -> object:
         if b"\xff" in data:
@@ -87,12 +85,12 @@ def test_the_fuzzer_finds_what_is_wrong(tmp_path: Path, monkeypatch: pytest.Monk
 
     monkeypatch.setitem(parsers.PARSERS, "bad", parsers.Parser((b"\x7f",), bad, names_file=False))
     monkeypatch.setattr(fuzz, "CORPUS", tmp_path)
-    watch = fuzz.Watch("bad", 4, seed=0)
+    watch = fuzz.Watch("bad", 4)
     for data in (b"fine", b"12\xff34", b"m"):
         watch.feed(data)
     monkeypatch.setattr(fuzz, "SECONDS", 0.5)
     watch.feed(b"\xfe")
-    watch.close()
+    assert not watch.close()
     assert [failure.split(" ")[0] for failure in watch.failures] == ["KeyError", "memory:", "HangError"]
     assert b"\xff" in {path.read_bytes() for path in (tmp_path / "bad").iterdir()}
     assert watch.refused == 1

@@ -68,6 +68,10 @@ class TestBlocks:
         found = blocks(pd.DataFrame([row("s", "a", 1.0), row("s", "b", 1.0), row("t", "a", 2.0)]))
         assert (found.methods, found.left_out) == ((("a", ""),), (("b", ""),))
 
+    def test_exact_recoveries_are_not_ranked_by_their_rounding(self) -> None:
+        found = blocks(pd.DataFrame([row("s", "a", 1e-9), row("s", "b", 1e-13)]))
+        assert found.values[0, 0] == found.values[0, 1]
+
     def test_nothing_scored(self) -> None:
         assert not blocks(pd.DataFrame([row("s", "a", np.nan, n_scored=0)])).enough
 
@@ -86,6 +90,10 @@ class TestRanks:
         assert found[1, 0] == pytest.approx(7 / 27, abs=0.03)
         assert np.allclose(found.sum(axis=0), 1)
         assert np.allclose(found.sum(axis=1), 1)
+
+    def test_problems_of_a_scene_are_drawn_too(self) -> None:
+        found = rank_probabilities(table([[1, 2], [1, 2], [2, 1]], (0, 0, 0)))
+        assert found[1, 0] == pytest.approx(7 / 27, abs=0.03)
 
     def test_many_seeds_of_one_scene_do_not_outvote_the_others(self) -> None:
         values = [[2, 1]] * 9 + [[1, 2]] * 2
@@ -126,6 +134,12 @@ class TestCriticalDifference:
         assert {found.methods[0][0], found.methods[1][0]} == {"b", "c"}
         apart = np.abs(np.subtract.outer(found.mean_ranks, found.mean_ranks)) > found.critical_difference
         assert np.array_equal(found.p_values < 0.05, apart)
+
+    def test_groups_overlap_where_the_ends_are_told_apart_and_the_middle_from_neither(self) -> None:
+        orders = [[1, 2, 3]] * 8 + [[2, 1, 3]] * 4 + [[1, 3, 2]] * 4 + [[2, 3, 1]] * 2 + [[3, 2, 1]] * 2
+        found = critical_difference(table(orders))
+        assert found.mean_ranks.tolist() == pytest.approx([1.5, 2.1, 2.4])
+        assert found.groups == ((0, 1), (1, 2))
 
     def test_without_friedman_all_are_one_group(self) -> None:
         found = critical_difference(table([[1, 2, 3], [3, 2, 1], [2, 1, 3]]))

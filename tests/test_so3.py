@@ -84,8 +84,9 @@ def test_means_follow_the_world_and_find_a_common_rotation(mean: object) -> None
     np.testing.assert_allclose(mean(np.tile(center, (5, 1, 1))), center, atol=1e-12)  # type: ignore[operator]
 
 
-def test_karcher_mean_follows_scipy() -> None:
-    r = so3.exp(0.3 * np.random.default_rng(0).standard_normal((30, 3)))
+@pytest.mark.parametrize("spread", [0.3, 1.0])
+def test_karcher_mean_follows_scipy(spread: float) -> None:
+    r = so3.exp(spread * np.random.default_rng(0).standard_normal((30, 3)))
     step = so3.log(r @ so3.karcher_mean(r).T).mean(axis=0)
     assert np.linalg.norm(step) < 1e-11
     np.testing.assert_allclose(so3.chordal_mean(r), Rotation.from_matrix(r).mean().as_matrix(), atol=1e-12)

@@ -88,6 +88,17 @@ def test_no_bound_where_inliers_do_not_connect_the_cameras() -> None:
     assert np.isnan(efficient_mean_deg(problem, inliers, "tangent", 5))
 
 
+def test_curvature_keeps_the_bound_below_the_error_of_a_guess() -> None:
+    """A uniform rotation is 1 / 3 pi^2 + 2 rad^2 from the truth in the mean; flat space would soon say more."""
+    pair = complete(2)
+    everywhere = np.arange(1.0, 181.0)
+    variances = [cramer_rao_variances(pair, np.ones(1, dtype=bool), "langevin", deg)[0] for deg in everywhere]
+    assert 0 <= min(variances) <= max(variances) < np.pi**2 / 3 + 2
+    assert 0.75 / information("langevin", 180) > 10
+    flat = 0.75 / information("langevin", 60)
+    assert variances[59] == pytest.approx(flat * (1 - flat / 9))
+
+
 def test_no_noise_no_error() -> None:
     assert bound(complete(4), noise_deg=0) == 0
 

@@ -1,6 +1,6 @@
 """What the harness costs: 300 trivial jobs, the time from one finished job to the next, and jobs a second.
 
-    python tests/overhead.py [WORKERS]
+    python tests/tools/overhead.py [WORKERS]
 
 No test, because it measures time. Planning, the instances and the start of the fork server are left out.
 """

@@ -1,8 +1,8 @@
-"""Fuzz the parsers: ``python tests/fuzz.py --parser g2o --inputs 100000``.
+"""Fuzz the parsers: ``python tests/tools/fuzz.py --parser g2o --inputs 100000``.
 
-Where atheris is installed, inputs are chosen by the code that they reach; otherwise, or with ``--engine mutation``, by
-chance from damaged files. Every input must be read, or refused with `InputError` in one line that names the file:
-no other exception, at most some seconds, no growth of memory. What fails is kept, made small, in
+Where atheris is installed, inputs are chosen by the code that they reach; otherwise, or with ``--engine chance``, they
+are damaged files as in the tests. Every input must be read, or refused with `InputError` in one line that names the
+file: no other exception, at most some seconds, no growth of memory. What fails is kept, made small, in
 ``tests/corpus/<parser>``, which the tests replay.
 """
 
@@ -10,6 +10,7 @@ import argparse
 import contextlib
 import gc
 import hashlib
+import importlib.util
 import os
 import random
 import resource
@@ -19,12 +20,13 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 
-CORPUS = Path(__file__).parent / "corpus"
-INPUTS = 100_000
+TESTS = Path(__file__).parent.parent
+sys.path[:0] = [str(TESTS), str(TESTS.parent)]
+
+CORPUS = TESTS / "corpus"
 SECONDS = 20.0  # of one input; much, for a machine may be busy
 GROWTH_MIB = 64.0  # of the process, after its warm-up
 PEAK_MIB = 512.0  # of one input
@@ -38,7 +40,7 @@ class HangError(BaseException):
 class Watch:
     """Feeds one parser, and keeps what fails."""
 
-    def __init__(self, name: str, inputs: int, seed: int) -> None:
+    def __init__(self, name: str, inputs: int, seed: int = 0) -> None:
         from parsers import PARSERS
 
         self.name, self.inputs = name, inputs
@@ -49,9 +51,8 @@ class Watch:
         self.was_refused = False
         self.slowest = self.rss = 0.0
         self.start = time.monotonic()
-        self._temporary = tempfile.TemporaryDirectory(
-            prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None
-        )
+        memory = "/dev/shm" if Path("/dev/shm").is_dir() else None
+        self._temporary = tempfile.TemporaryDirectory(prefix="fuzz-", dir=memory)
         self.folder = Path(self._temporary.name)
         signal.signal(signal.SIGALRM, _hang)
 
@@ -61,20 +62,11 @@ class Watch:
         gc.collect()
         return _rss_mib() - self.rss
 
-    def limit_memory(self) -> None:
-        """Let this process have little more address space than it has, so that nothing can claim much unnoticed."""
-        import psutil
+    def damaged(self, *others: bytes) -> bytes:
+        """A damaged copy of one of the parser's files, or of others."""
+        from damage import damaged
 
-        most = psutil.Process().memory_info().vms + int(4 * PEAK_MIB * 2**20)
-        resource.setrlimit(resource.RLIMIT_AS, (most, most))
-
-    def mutated(self) -> bytes:
-        """A damaged copy of one of the seeds."""
-        from mutation import mutated
-
-        return mutated(
-            self.rng.choice(self.parser.seeds), self.rng.choice(self.parser.seeds), self.parser.container, self.rng
-        )
+        return damaged(others or self.parser.seeds, self.parser.container, self.rng)
 
     def feed(self, data: bytes) -> None:
         """Read one input; whatever it does that it must not is kept."""
@@ -99,6 +91,8 @@ class Watch:
             self.rss = _rss_mib()
 
     def _read(self, data: bytes) -> str:
+        from parsers import complaint
+
         from bench.core.errors import InputError
 
         self.was_refused = False
@@ -135,33 +129,24 @@ class Watch:
         (folder / hashlib.sha256(data).hexdigest()[:16]).write_bytes(data)
         print(f"{self.name}: input {self.fed}, {len(data)} bytes: {failure}", flush=True)
 
-    def close(self) -> None:
-        """Remove the folder of the inputs."""
-        self._temporary.cleanup()
-
-    def report(self) -> str:
-        """One line: inputs, refusals, seconds, memory, failures."""
-        seconds = time.monotonic() - self.start
-        return (
-            f"{self.name:<14} {self.fed} inputs, {self.refused} refused, {seconds:.0f} s, "
-            f"slowest {self.slowest:.2f} s, memory {self.growth:+.1f} MiB, {len(self.failures)} failures"
+    def close(self) -> bool:
+        """Print one line of what was found, and remove the folder of the inputs; whether all was well."""
+        growth = self.growth if self.fed > WARM_UP else 0.0
+        print(
+            f"{self.name:<14} {self.fed} inputs, {self.refused} refused, {time.monotonic() - self.start:.0f} s, "
+            f"slowest {self.slowest:.2f} s, memory {growth:+.1f} MiB, {len(self.failures)} failures",
+            flush=True,
         )
-
-
-def complaint(message: str, file: str) -> str:
-    """What is wrong with a refusal, or nothing."""
-    if "\n" in message or len(message) > 3000:
-        return f"the message is not one line: {message[:30]!r}"
-    return "" if file in message else f"the message does not name the file: {message[:30]!r}"
+        self._temporary.cleanup()
+        return not self.failures and growth <= GROWTH_MIB
 
 
 def _signature(error: BaseException) -> str:
-    """Type of an exception and where it was raised, so that each fault is kept once."""
-    trace = error.__traceback__
-    place = ""
+    """Type of an exception and where the project raised it, so that each fault is kept once."""
+    trace, place = error.__traceback__, ""
     while trace is not None:
         file = Path(trace.tb_frame.f_code.co_filename)
-        if file.parent.name in ("bench", "formats", "papers", "execution", "datasets", "methods"):
+        if file.is_relative_to(TESTS.parent) and not file.is_relative_to(TESTS):
             place = f"{file.name}:{trace.tb_lineno}"
         trace = trace.tb_next
     return f"{type(error).__name__} at {place or str(error)[:100]}"
@@ -181,16 +166,23 @@ def _peak_mib() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def by_mutation(watch: Watch) -> None:
-    """Feed damaged copies of the seeds."""
+def _limit_memory() -> None:
+    """Let this process have little more address space than it has, so that nothing can claim much unnoticed."""
+    import psutil
+
+    most = psutil.Process().memory_info().vms + int(4 * PEAK_MIB * 2**20)
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+def by_chance(watch: Watch) -> None:
+    """Feed damaged files."""
     while watch.fed < watch.inputs:
-        watch.feed(watch.mutated())
+        watch.feed(watch.damaged())
 
 
 def by_coverage(watch: Watch) -> None:
     """Feed what libFuzzer makes of the seeds, of our own damage and of what reached new code; does not return."""
     import atheris
-    from mutation import mutated
 
     def one(data: bytes) -> None:
         watch.feed(data)
@@ -198,77 +190,54 @@ def by_coverage(watch: Watch) -> None:
             _finish(watch)
 
     def mutator(data: bytes, most: int, seed: int) -> bytes:
-        rng = random.Random(seed)
-        if rng.random() < 0.4:  # what reached new code is often broken beyond recognition
-            return watch.mutated()[:most]
-        if watch.parser.container == "plain" and rng.random() < 0.4:
+        watch.rng.seed(seed)
+        chance = watch.rng.random()
+        if watch.parser.container == "plain" and chance < 0.25:
             return atheris.Mutate(data, most)[:most]
-        with contextlib.suppress(Exception):  # what is not packed as it should be cannot be damaged inside
-            return mutated(data, rng.choice(watch.parser.seeds), watch.parser.container, rng)[:most]
-        return watch.mutated()[:most]
+        if chance < 0.6:
+            with contextlib.suppress(Exception):  # what is not packed as it should be cannot be damaged inside
+                return watch.damaged(data)[:most]
+        return watch.damaged()[:most]  # what reached new code is often broken beyond recognition
 
-    with _seed_folder(watch) as folder:
-        arguments = [
-            "fuzz",
-            str(folder),
-            "-max_len=20000",
-            "-verbosity=0",
-            "-rss_limit_mb=0",
-        ]
-        atheris.Setup(arguments, one, custom_mutator=mutator)
+    with tempfile.TemporaryDirectory(prefix="seeds-") as folder:
+        kept = [path.read_bytes() for path in (CORPUS / watch.name).glob("*")]
+        for k, data in enumerate([*watch.parser.seeds, *kept]):
+            Path(folder, f"seed{k}").write_bytes(data)
+        # what is slow or too large is ours to judge, and nothing is written where the user stands
+        options = ["-max_len=20000", "-verbosity=0", "-rss_limit_mb=0", f"-artifact_prefix={folder}/"]
+        atheris.Setup(["fuzz", folder, *options], one, custom_mutator=mutator)
         atheris.Fuzz()
-
-
-@contextlib.contextmanager
-def _seed_folder(watch: Watch) -> Iterator[Path]:
-    with tempfile.TemporaryDirectory(prefix="seeds-") as name:
-        for k, data in enumerate(watch.parser.seeds):
-            Path(name, f"seed{k}").write_bytes(data)
-        for path in sorted((CORPUS / watch.name).glob("*")):
-            Path(name, path.name).write_bytes(path.read_bytes())
-        yield Path(name)
 
 
 def _finish(watch: Watch) -> None:
     """Print the report and end the process, for libFuzzer has no other end."""
-    failed = bool(watch.failures) or watch.growth > GROWTH_MIB
-    print(watch.report(), flush=True)
-    watch.close()
+    well = watch.close()
     sys.stdout.flush()
-    os._exit(1 if failed else 0)
+    os._exit(0 if well else 1)
 
 
 def _fuzz_one(name: str, inputs: int, engine: str, seed: int) -> None:
     """Fuzz one parser in this process; does not return."""
     sys.dont_write_bytecode = True
     warnings.simplefilter("ignore")
-    if engine == "coverage":
-        import atheris
+    with contextlib.ExitStack() as instrumented:
+        if engine == "coverage":
+            import atheris
 
-        with atheris.instrument_imports(include=["bench"]):
-            watch = Watch(name, inputs, seed)
-        watch.limit_memory()
-        by_coverage(watch)
-    watch = Watch(name, inputs, seed)
-    watch.limit_memory()
-    by_mutation(watch)
+            instrumented.enter_context(atheris.instrument_imports(include=["bench"]))
+        watch = Watch(name, inputs, seed)
+    _limit_memory()
+    (by_coverage if engine == "coverage" else by_chance)(watch)
     _finish(watch)
-
-
-def _has_atheris() -> bool:
-    import importlib.util
-
-    return importlib.util.find_spec("atheris") is not None
 
 
 def main() -> int:
     """Fuzz the parsers that were named, each in a process of its own; 1 where one failed."""
     parse = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n")[0])
     parse.add_argument("--parser", action="append", help="default: all")
-    parse.add_argument("--inputs", type=int, default=INPUTS)
-    parse.add_argument(
-        "--engine", choices=("coverage", "mutation"), default="coverage" if _has_atheris() else "mutation"
-    )
+    parse.add_argument("--inputs", type=int, default=100_000)
+    default = "coverage" if importlib.util.find_spec("atheris") else "chance"
+    parse.add_argument("--engine", choices=("coverage", "chance"), default=default)
     parse.add_argument("--seed", type=int, default=0)
     parse.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     given = parse.parse_args()

@@ -1,6 +1,6 @@
 """Fill a run's folder with records as a sweep would, to time what reads them.
 
-    python -m tests.generate_records FOLDER 1000000
+    python tests/tools/generate_records.py FOLDER 1000000
     time python -m bench table FOLDER
 
 Truths, measurements and estimates are random and small (five cameras, all connected); every instance,
