@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.core.problem import Floats, Problem
+from bench import Floats, Problem
 
 from ..linear.laplacian import LaplacianSolver
 from ..loops import edge_kernels

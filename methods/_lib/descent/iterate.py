@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Floats, Ints, Problem
+from bench import Floats, Ints, Problem, so3
 
 from ..loops import edge_kernels
 

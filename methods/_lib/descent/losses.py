@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core.problem import Floats
+from bench import Floats
 
 LossName = Literal[
     "geman-mcclure",

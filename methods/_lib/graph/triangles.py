@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import so3
-from bench.core.problem import Floats, Ints, Problem
+from bench import Floats, Ints, Problem, so3
 
 from ..loops.edge_kernels import compiled
 
@@ -65,7 +64,7 @@ def sample_triangles(problem: Problem, most: int, rng: np.random.Generator) -> T
     counts = np.empty(problem.m, dtype=np.int32)
     sides = np.empty((problem.m, most, 2), dtype=np.int32)
     _sample(offsets, neighbours, ids, int(rng.integers(2**32)), counts, sides)
-    inconsistency = np.empty((problem.m, most))
+    inconsistency = np.zeros((problem.m, most))  # all of it is divided
     _cycle_angles(problem.edges, so3.to_quaternion(problem.rotations), counts, sides, inconsistency)
     inconsistency /= np.pi
     return Triangles(counts, sides, inconsistency)
