@@ -7,11 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core.errors import InputError, suggestion
-from bench.core.problem import Floats, Instance
+from bench import Floats, InputError, Instance, Missing, Source, dataset
+from bench.core.errors import suggestion
 from bench.formats.graph import GraphFile
 from bench.formats.one_dsfm import BUNDLE, COMPONENT, EDGES, IMAGES, read_bundle, read_folder
-from bench.plugins.declare import Missing, Source, dataset
 
 from ._files.archive import damaged, unpack
 from ._files.download import Archive, download
