@@ -110,4 +110,5 @@ class Folded:
 
 
 def _relative(rotations: Floats, i: Ints, j: Ints) -> Floats:
+    """R_i R_j^T (k, 3, 3) for the pairs i, j (k,)."""
     return rotations[i] @ np.swapaxes(rotations[j], -1, -2)

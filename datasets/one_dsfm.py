@@ -175,6 +175,7 @@ def _truth(folder: Path, graph: GraphFile) -> Floats | None:
 
 
 def _truth_notes(scene: str, truth: Floats | None) -> tuple[str, ...]:
+    """What a reader must know of the truth (n, 3, 3) of a scene."""
     if truth is None:
         return (f"{scene} has no ground truth here ({BUNDLE} is missing): not scored, cost and time only",)
     count = int(np.isfinite(truth).all(axis=(1, 2)).sum())

@@ -195,7 +195,7 @@ class DMFSynch(Presets):
     def _start(
         self, problem: Problem, observed: Observed, scale: Floats, rng: np.random.Generator
     ) -> tuple[Floats, Floats]:
-        """Singular values and vectors of the first product."""
+        """Singular values (w,) and vectors (3n, w) of the first product; `scale` is (3n, 1)."""
         width = min(self.width or 3, 3 * problem.n)
         if self.init == "random":
             wide = min(max(WIDE, width), 3 * problem.n)
@@ -310,6 +310,6 @@ def _singular_values(values: Floats) -> dict[str, float]:
 
 
 def _eigenpairs(columns: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues, descending, and eigenvectors of columns @ columns.T, those of zero left out."""
+    """Eigenvalues (w,), descending, and eigenvectors of columns @ columns.T, `columns` being (3n, w)."""
     vectors, values, _ = np.linalg.svd(columns, full_matrices=False)
     return values**2, vectors

@@ -79,7 +79,7 @@ class GNC(Started):
         return Estimate(here.rotations, edge_weights=weights, iterations=done, stop_reason=reason, cost=cost)
 
     def _settled(self, here: Iterate, weights: Floats, laplacian: LaplacianSolver, limit: int) -> tuple[Iterate, float]:
-        """Where weighted least squares leads to from `here`, and the mean of the first steps."""
+        """Where least squares with `weights` (m,) leads to from `here`, and the mean of the first steps."""
         lengths: list[float] = []
         while len(lengths) < limit and (not lengths or lengths[-1] >= np.radians(self.tolerance_deg)):
             steps = laplacian.solve(floored(weights), here.vectors)

@@ -100,7 +100,7 @@ class HARA(Warm):
 
 
 def _connecting(problem: Problem, residuals: Floats, kept: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Edges outside `kept`, of the smallest residuals, that a connected graph needs beside those."""
+    """Edges (k,) outside `kept` (m,), of the smallest residuals, that a connected graph needs beside those."""
     if Problem(problem.n, problem.edges[kept], problem.rotations[kept]).components.max() == 0:
         return np.zeros(0, dtype=np.intp)
     tree = tree_edges(problem, 1 / (1 + residuals))

@@ -135,7 +135,7 @@ class Program:
         self.vectors, self.values = vectors[:, kept], np.sign(values[kept]) * sizes[kept]
 
     def _leading(self, matrix: Floats) -> tuple[Floats, Floats]:
-        """Eigenvalues and eigenvectors of the `matrix` that may be larger than 1 / mu."""
+        """Eigenvalues and eigenvectors of the `matrix` (3n, 3n) that may be larger than 1 / mu."""
         size, width = len(matrix), len(self.values) + EXTRA
         if self._problem.n <= SMALL or 3 * width > size:
             return np.linalg.eigh(matrix)

@@ -158,6 +158,6 @@ def _status_checked_later() -> Any:
 
 
 def _packed(symmetric: Floats) -> Floats:
-    """Lower triangle, column by column, off-diagonal entries times sqrt(2): SCS's symmetric matrix."""
+    """Lower triangle of a matrix (N, N), column by column, off-diagonal entries times sqrt(2), as SCS wants it."""
     row, col = np.triu_indices(len(symmetric))
     return symmetric[row, col] * np.where(row == col, 1.0, np.sqrt(2))

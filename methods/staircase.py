@@ -92,7 +92,7 @@ class Staircase(Seeded):
         measurements, degree = problem.block_matrix(), problem.degree[:, None, None]
 
         def product(x: Floats) -> Floats:
-            """G Y; pymanopt's points are the transposes Y_i^T (p, 3)."""
+            """G Y (n, p, 3); pymanopt's points are the transposes Y_i^T (p, 3)."""
             return _transposed((measurements @ _transposed(x).reshape(-1, p)).reshape(n, 3, p))
 
         def cost(x: Floats) -> Any:
@@ -143,9 +143,11 @@ def _orthonormal(points: Floats) -> Floats:
 
 
 def _rounded(points: Floats) -> Floats:
+    """Rotations (n, 3, 3) from points (n, 3, p), by their three leading right singular vectors."""
     _, _, right = np.linalg.svd(points.reshape(-1, points.shape[2]), full_matrices=False)
     return nearest_rotations(points.reshape(-1, points.shape[2]) @ right[:3].T)
 
 
 def _transposed(x: Floats) -> Floats:
+    """From (n, 3, p) to (n, p, 3) and back, in consecutive memory."""
     return np.ascontiguousarray(np.swapaxes(x, 1, 2))

@@ -121,5 +121,6 @@ class TGMCMC(Started):
 
 
 def _checkpoint(iteration: int, clock: float, cameras: Floats, energy: float) -> Checkpoint:
+    """The state of the quaternions `cameras` (n, 4)."""
     rotations = so3.from_quaternion(cameras)
     return Checkpoint(iteration, time.perf_counter() - clock, rotations, {"cost": float(CHORDAL * energy)})

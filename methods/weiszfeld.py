@@ -67,5 +67,6 @@ class Weiszfeld(Started):
 
 
 def _order(problem: Problem) -> Ints:
+    """Cameras (n,) in the order in which they move."""
     angles = np.repeat(so3.angle(problem.rotations), 2)
     return np.lexsort((np.bincount(problem.edges.ravel(), angles), -problem.degree)).astype(np.int32)

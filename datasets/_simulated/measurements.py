@@ -81,6 +81,7 @@ class Measurements:
         return [parts[field.name] for field in fields(self) if getattr(self, field.name) != field.default]
 
     def _outlying(self, rng: np.random.Generator, count: int) -> Floats:
+        """Rotations (count, 3, 3) in place of measurements."""
         if self.outlier_model == "authors":
             return so3.project(rng.random((count, 3, 3)))
         return so3.random(rng, count)

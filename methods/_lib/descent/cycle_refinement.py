@@ -66,6 +66,7 @@ def refined(
 
 
 def _weights(levels: Floats, kept: float, smallest: float = SMALLEST_WEIGHT) -> Floats:
+    """Weights (m,) for `levels` (m,), of which the share `kept` that is lowest counts."""
     weights = np.maximum(levels, LARGEST_WEIGHT ** (-2 / 3)) ** -1.5
     weights[levels > np.quantile(levels, kept)] = 0
     return np.maximum(weights, smallest * weights.max())

@@ -62,6 +62,7 @@ def floored(weights: Floats) -> Floats:
 
 
 def _measured(edges: Ints, measured: Floats, cameras: Floats) -> Iterate:
+    """The iterate with these `cameras` (n, 4); shapes as in `Iterate`."""
     vectors, angles = np.empty((len(edges), 3)), np.empty(len(edges))
     edge_kernels.edge_residuals(edges, measured, cameras, vectors, angles)
     return Iterate(edges, measured, cameras, vectors, angles)

@@ -41,7 +41,7 @@ class Surrogate:
 
 
 def tls_weight(x: Floats, mu: float) -> Floats:
-    """Weights: 1 up to x = mu / (mu + 1), 0 from (mu + 1) / mu, between them sqrt(mu (mu + 1) / x) - mu."""
+    """Weights (m,): 1 up to x = mu / (mu + 1), 0 from (mu + 1) / mu, between them sqrt(mu (mu + 1) / x) - mu."""
     x = np.maximum(x, mu / (mu + 1))
     # The difference of two numbers that grow with mu, written as one fraction.
     return np.maximum((mu + mu**2 * (1 - x)) / (x * (np.sqrt(mu * (mu + 1) / x) + mu)), 0.0)

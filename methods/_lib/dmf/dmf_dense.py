@@ -94,6 +94,7 @@ class DenseFactorization:
 
 
 def _leading(matrix: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (4,), descending, and eigenvectors (N, 4) of a symmetric matrix (N, N)."""
     if not np.isfinite(matrix).all():
         raise FloatingPointError("the product diverged; a smaller lr may help")
     if len(matrix) <= SMALL:

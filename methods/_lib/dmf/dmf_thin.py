@@ -86,7 +86,7 @@ class Factors:
         return cls((vectors * root).astype(np.float32), middle)
 
     def partial_products(self) -> tuple[list[Single], list[Single]]:
-        """Products of the middle factors before each, and after each; the last and the first are of all."""
+        """Products (w, w) of the middle factors before each, and after each; the last and the first are of all."""
         identity = np.eye(self.end.shape[1], dtype=np.float32)
         before, after = [identity], [identity]
         for factor in self.middle:

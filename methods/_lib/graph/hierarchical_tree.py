@@ -38,7 +38,7 @@ def support_levels(problem: Problem, triangles: AllTriangles, thresholds: Floats
 
 
 def hierarchical_tree(problem: Problem, levels: Ints, lost: int) -> Tree:
-    """Grow a tree from the camera of highest degree, along edges of the lowest possible level.
+    """Grow a tree from the camera of highest degree, along edges of the lowest possible of `levels` (m,).
 
     Of the cameras that can branch out at that level, the one with the most neighbours outside the tree does, to all of
     them that the level reaches. Where all edges that leave the tree are at level `lost`, the outside camera with the

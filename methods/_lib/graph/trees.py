@@ -51,7 +51,7 @@ def hub(problem: Problem) -> int:
 
 
 def _heaviest_tree(problem: Problem, weights: Floats) -> EdgeIds:
-    """Minimum spanning tree of the ranks, which are all different, so that there is only one."""
+    """Minimum spanning tree (n - 1,) of the ranks of `weights` (m,), all different, so that there is only one."""
     from scipy.sparse.csgraph import minimum_spanning_tree
 
     by_rank = np.lexsort((so3.angle(problem.rotations), -weights))
@@ -63,7 +63,7 @@ def _heaviest_tree(problem: Problem, weights: Floats) -> EdgeIds:
 
 
 def _breadth_first_tree(problem: Problem) -> EdgeIds:
-    """Of the edges that lead one level up from a camera, the one to the highest degree."""
+    """Edges (n - 1,): of those that lead one level up from a camera, the one to the highest degree."""
     _, depth = _search(problem, np.arange(problem.m), hub(problem))
     difference = np.diff(depth[problem.edges], axis=1)[:, 0]
     candidates = np.flatnonzero(difference)
@@ -91,6 +91,7 @@ def _search(problem: Problem, chosen: EdgeIds, root: int) -> tuple[Ints, Ints]:
 
 
 def _upper(problem: Problem, chosen: EdgeIds, values: Floats) -> "sparse.csr_array":
+    """Matrix (n, n) of `values` (k,) on the edges `chosen` (k,), above the diagonal."""
     from scipy import sparse
 
     i, j = problem.edges[chosen].T

@@ -17,7 +17,7 @@ ROUNDING = 4e-15  # of the cost, for each edge
 
 
 def chordal_cost(problem: Problem, rotations: Floats) -> float:
-    """Sum over the edges of the squared Frobenius norm of R_ij - R_i R_j^T."""
+    """Sum over the edges of the squared Frobenius norm of R_ij - R_i R_j^T, at R (n, 3, p)."""
     i, j = problem.edges.T
     difference = problem.rotations - rotations[i] @ np.swapaxes(rotations[j], -1, -2)
     return float(np.sum(difference**2))

@@ -109,7 +109,7 @@ def _conjugate_gradients(
 
 
 def _dots(a: Singles, b: Singles) -> Singles:
-    """Scalar product of each pair of columns."""
+    """Scalar products (4,) of the columns of a and b (n, 4)."""
     products: Singles = np.einsum("nk,nk->k", a, b)
     return products
 
@@ -127,6 +127,8 @@ def _factored(problem: Problem) -> "_DenseSystem | _SparseSystem":
 
 
 class _DenseSystem:
+    """`solve` takes weights (m,), their sums (n,) and right-hand sides (n - 1, 3), and returns x (n - 1, 3)."""
+
     def __init__(self, problem: Problem) -> None:
         self._edges = problem.edges
         self._rows = np.empty((problem.n - 1, problem.n - 1))
@@ -142,6 +144,8 @@ class _DenseSystem:
 
 
 class _SparseSystem:
+    """As `_DenseSystem`."""
+
     def __init__(self, problem: Problem) -> None:
         from scipy import sparse
 
