@@ -6,17 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.core import seeds, so3
-from bench.core.errors import InputError
-from bench.core.problem import Instance, Ints, Problem
-from bench.plugins.declare import Source, dataset
+from bench import Instance, Problem, Source, dataset, parameter, so3, stream
 
 from ._files.folders import revision
+from ._simulated.graphs import connected_graph
 from ._simulated.measurements import CODE, Measurements, OutlierModel
 from ._simulated.noise import Noise
 from ._simulated.statistics import statistics
 
-_ATTEMPTS = 1000
 _MOST_CAMERAS = 30_000  # every pair is drawn; this many take 7 GiB
 
 
@@ -52,27 +49,20 @@ class ErdosRenyi:
         their code, which is biased towards one part of SO(3).
     noise
         ``paper``, or one of two models for which a Cramér-Rao bound exists: ``tangent`` (a Gaussian rotation
-        vector) and ``langevin``; the formulas are in ``_noise.py``.
+        vector) and ``langevin``; the formulas are in ``_simulated/noise.py``.
     clairvoyant
         Leave out the edges that are outliers, which only the truth can tell: the same graph and the same
         measurements otherwise, so that errors on it say what is lost by having to find the outliers. What is
         left need not be connected.
     """
 
-    n: int = 100
-    missing: float = 0.5
-    noise_deg: float = 5.0
-    outliers: float = 0.4
+    n: int = parameter(100, at_least=2, at_most=_MOST_CAMERAS)
+    missing: float = parameter(0.5, at_least=0, below=1)
+    noise_deg: float = parameter(5.0, at_least=0, at_most=180)
+    outliers: float = parameter(0.4, at_least=0, at_most=1)
     outlier_model: OutlierModel = "haar"
     noise: Noise = "paper"
     clairvoyant: bool = False
-
-    def __post_init__(self) -> None:
-        if not 2 <= self.n <= _MOST_CAMERAS:
-            raise ValueError(f"n must be from 2 to {_MOST_CAMERAS}, not {self.n}")
-        if not 0 <= self.missing < 1:
-            raise ValueError(f"missing must be at least 0 and below 1, not {self.missing}")
-        Measurements.of(self)
 
     def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source]:
         """One instance for each seed."""
@@ -80,9 +70,9 @@ class ErdosRenyi:
         yield Source(self._name(), identity, lambda: self._generate(seed, identity), seeded=True)
 
     def _generate(self, seed: int, identity: str) -> Instance:
-        rng = seeds.stream(seed, "data", "erdos-renyi")
+        rng = stream(seed, "data", "erdos-renyi")
         truth = so3.from_euler(rng.uniform(-np.pi, np.pi, (self.n, 3)))
-        edges = self._connected_graph(rng)
+        edges = connected_graph(self.n, 1 - self.missing, rng, "a smaller missing or a larger n")
         rotations, outliers = Measurements.of(self).simulate(truth, edges, rng)
         if self.clairvoyant:
             edges, rotations, outliers = edges[~outliers], rotations[~outliers], outliers[~outliers]
@@ -96,22 +86,6 @@ class ErdosRenyi:
             revision=identity,
             notes=("the true outliers are left out, which no method can know",) if self.clairvoyant else (),
             statistics=statistics(problem),
-        )
-
-    def _connected_graph(self, rng: np.random.Generator) -> Ints:
-        """Edges (m, 2) of the first connected graph drawn."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        i, j = np.triu_indices(self.n, 1)
-        for _ in range(_ATTEMPTS):
-            kept = rng.random(len(i)) < 1 - self.missing
-            graph = coo_array((np.ones(kept.sum()), (i[kept], j[kept])), shape=(self.n, self.n))
-            if connected_components(graph, directed=False, return_labels=False) == 1:
-                return np.stack([i[kept], j[kept]], axis=1).astype(np.int32)
-        raise InputError(
-            f"erdos-renyi: none of {_ATTEMPTS} random graphs with n={self.n} and missing={self.missing} is "
-            "connected; choose a smaller missing or a larger n"
         )
 
     def _name(self) -> str:

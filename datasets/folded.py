@@ -7,17 +7,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import seeds, so3
-from bench.core.errors import InputError
-from bench.core.problem import Floats, Instance, Ints, Problem
-from bench.plugins.declare import Source, dataset
+from bench import Floats, Instance, Ints, Problem, Source, dataset, parameter, so3, stream
 
 from ._files.folders import revision
+from ._simulated.graphs import connected_graph, pieces
 from ._simulated.measurements import CODE, Measurements, OutlierModel
 from ._simulated.noise import Noise
 from ._simulated.statistics import statistics
-
-_ATTEMPTS = 1000
 
 
 @dataset("folded", title="Folded scenes", cite="tejus2023")
@@ -52,27 +48,16 @@ class Folded:
         As in ``erdos-renyi``.
     """
 
-    n: int = 200
-    share: float = 0.25
-    angle_deg: float = 25.0
-    agreeing: float = 0.7
-    across: float = 0.2
-    missing: float = 0.7
-    noise_deg: float = 5.0
-    outliers: float = 0.1
+    n: int = parameter(200, at_least=4)
+    share: float = parameter(0.25, at_least=0, at_most=1)
+    angle_deg: float = parameter(25.0, at_least=0, at_most=180)
+    agreeing: float = parameter(0.7, at_least=0, at_most=1)
+    across: float = parameter(0.2, at_least=0, at_most=1)
+    missing: float = parameter(0.7, at_least=0, at_most=1)
+    noise_deg: float = parameter(5.0, at_least=0, at_most=180)
+    outliers: float = parameter(0.1, at_least=0, at_most=1)
     outlier_model: OutlierModel = "haar"
     noise: Noise = "paper"
-
-    def __post_init__(self) -> None:
-        """Check the parameters."""
-        if self.n < 4:
-            raise ValueError(f"n must be at least 4, not {self.n}")
-        for name in ("share", "agreeing", "across", "missing"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ValueError(f"{name} must be from 0 to 1, not {getattr(self, name)}")
-        if not 0 <= self.angle_deg <= 180:
-            raise ValueError(f"angle_deg must be from 0 to 180, not {self.angle_deg}")
-        Measurements.of(self)
 
     def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source]:
         """One instance for each seed."""
@@ -80,7 +65,7 @@ class Folded:
         yield Source(self._name(), identity, lambda: self._generate(seed, identity), seeded=True)
 
     def _generate(self, seed: int, identity: str) -> Instance:
-        rng = seeds.stream(seed, "data", "folded")
+        rng = stream(seed, "data", "folded")
         truth = so3.random(rng, self.n)
         part = np.zeros(self.n, dtype=bool)
         part[rng.choice(self.n, round(self.share * self.n), replace=False)] = True
@@ -107,18 +92,15 @@ class Folded:
         )
 
     def _connected_graph(self, part: NDArray[np.bool_], rng: np.random.Generator) -> Ints:
-        """Edges (m, 2) of the first graph drawn of which both sides and the whole are connected."""
+        """Edges (m, 2) of the first graph drawn of which both sides, one of them `part` (n,), and the whole connect."""
         i, j = np.triu_indices(self.n, 1)
         probability = (1 - self.missing) * np.where(part[i] == part[j], 1, self.across)
-        for _ in range(_ATTEMPTS):
-            kept = rng.random(len(i)) < probability
-            edges = np.stack([i[kept], j[kept]], axis=1).astype(np.int32)
-            if _pieces(edges, self.n) == 1 and _pieces(edges[part[edges[:, 0]] == part[edges[:, 1]]], self.n) <= 2:
-                return edges
-        raise InputError(
-            f"folded: none of {_ATTEMPTS} random graphs with n={self.n}, missing={self.missing} and "
-            f"across={self.across} is connected; choose a smaller missing, or a larger across or n"
-        )
+
+        def sides_connect(edges: Ints) -> bool:
+            return pieces(edges[part[edges[:, 0]] == part[edges[:, 1]]], self.n) <= 2
+
+        advice = "a smaller missing, or a larger across or n"
+        return connected_graph(self.n, probability, rng, advice, sides_connect)
 
     def _name(self) -> str:
         """``n200-share0.25-angle25.0``, then every other parameter that is not at its default."""
@@ -128,12 +110,5 @@ class Folded:
 
 
 def _relative(rotations: Floats, i: Ints, j: Ints) -> Floats:
+    """R_i R_j^T (k, 3, 3) for the pairs i, j (k,)."""
     return rotations[i] @ np.swapaxes(rotations[j], -1, -2)
-
-
-def _pieces(edges: Ints, n: int) -> int:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
-    return int(connected_components(graph, directed=False, return_labels=False))

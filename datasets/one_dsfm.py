@@ -7,11 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core.errors import InputError, suggestion
-from bench.core.problem import Floats, Instance
+from bench import Floats, InputError, Instance, Missing, Source, dataset
+from bench.core.errors import suggestion
 from bench.formats.graph import GraphFile
 from bench.formats.one_dsfm import BUNDLE, COMPONENT, EDGES, IMAGES, read_bundle, read_folder
-from bench.plugins.declare import Missing, Source, dataset
 
 from ._files.archive import damaged, unpack
 from ._files.download import Archive, download
@@ -175,6 +174,7 @@ def _truth(folder: Path, graph: GraphFile) -> Floats | None:
 
 
 def _truth_notes(scene: str, truth: Floats | None) -> tuple[str, ...]:
+    """What a reader must know of the truth (n, 3, 3) of a scene."""
     if truth is None:
         return (f"{scene} has no ground truth here ({BUNDLE} is missing): not scored, cost and time only",)
     count = int(np.isfinite(truth).all(axis=(1, 2)).sum())

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.core.errors import InputError, suggestion
-from bench.core.problem import Floats, Instance, Problem
+from bench import Floats, InputError, Instance, Missing, Problem, Source, dataset
+from bench.core.errors import suggestion
 from bench.formats.pose_graph import read_pose_graph
-from bench.plugins.declare import Missing, Source, dataset
 
 from ._files.folders import revision, roots
 from ._simulated.statistics import statistics

@@ -4,11 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.core import seeds, so3
+from bench import Instance, Missing, Problem, Source, dataset, parameter, so3, stream
 from bench.core.errors import suggestion
-from bench.core.problem import Instance, Problem
 from bench.formats.npz import read_topology
-from bench.plugins.declare import Missing, Source, dataset
 
 from ._files.folders import revision, roots
 from ._simulated.measurements import CODE, Measurements, OutlierModel
@@ -38,16 +36,14 @@ class ViewGraph:
     """
 
     scene: str | None = None
-    noise_deg: float = 5.0
-    outliers: float = 0.4
+    noise_deg: float = parameter(5.0, at_least=0, at_most=180)
+    outliers: float = parameter(0.4, at_least=0, at_most=1)
     outlier_model: OutlierModel = "haar"
     noise: Noise = "paper"
 
     def __post_init__(self) -> None:
-        """Check the parameters."""
         if self.scene is not None and Path(self.scene).name != self.scene:
             raise ValueError(f"scene is a name without folders and without .npz, not '{self.scene}'")
-        Measurements.of(self)
 
     def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source | Missing]:
         """Scenes in alphabetical order, one instance of each for each seed.
@@ -81,7 +77,7 @@ def _how_to_get(scene: str, folder: Path) -> str:
 
 def _load(path: Path, measurements: Measurements, name: str, seed: int, identity: str) -> Instance:
     n, edges = read_topology(path)
-    rng = seeds.stream(seed, "data", "view-graph", path.stem)
+    rng = stream(seed, "data", "view-graph", path.stem)
     truth = so3.random(rng, n)
     rotations, outliers = measurements.simulate(truth, edges, rng)
     problem = Problem(n, edges, rotations)

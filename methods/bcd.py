@@ -5,13 +5,11 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
-from . import spectral
-from ._lib.graph.starts import Seeded, Start, start_rotations
 from ._lib.linear.certificate import ROUNDING, chordal_cost, smallest_eigenvalue
 from ._lib.linear.rounding import rounded
+from ._lib.starts import Seeded, Start, start_rotations
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -60,20 +58,9 @@ class BCD(Seeded):
     """
 
     init: Init = "identity"
-    tolerance: float = 1e-9
-    max_epochs: int = 500
-    max_cameras: int = 500
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.tolerance < 0:
-            raise ValueError(f"tolerance must not be negative, not {self.tolerance:g}")
-        if self.max_epochs < 1:
-            raise ValueError(f"max_epochs must be at least 1, not {self.max_epochs}")
-
-    def warm_up(self) -> None:
-        """Compile what the starts use and load scipy."""
-        spectral.compile_and_load()
+    tolerance: float = parameter(1e-9, at_least=0)
+    max_epochs: int = parameter(500, at_least=1)
+    max_cameras: int = parameter(500, at_least=1)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         gram = np.eye(3 * problem.n)

@@ -5,10 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core.problem import Estimate, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Problem, method, parameter
 
-from . import spectral
 from ._lib.graph.cemp import (
     ITERATIONS,
     MOST_ITERATIONS,
@@ -16,14 +14,15 @@ from ._lib.graph.cemp import (
     corruption_levels,
     inlier_weights,
     tree_of_least_corruption,
-    weighted_spectral,
 )
 from ._lib.graph.triangles import sample_triangles
+from ._lib.linear.spectral import weighted_spectral
+from ._lib.warm_up import Warm
 
 
 @method("cemp", title="CEMP", cite="lerman2022", requires=("scipy", "numba"), robust=True, deterministic=False)
 @dataclass(frozen=True)
-class CEMP:
+class CEMP(Warm):
     """Estimates how corrupted each edge is from the triangles over it alone, then solves with the good edges.
 
     1. Take up to `triangles` triangles over each edge and their inconsistencies d_ij,k, the angle of R_ij R_jk R_ki
@@ -51,21 +50,8 @@ class CEMP:
     """
 
     solver: Literal["mst", "gcw"] = "mst"
-    triangles: int = TRIANGLES
-    iterations: int = ITERATIONS
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.triangles < 1:
-            raise ValueError(f"triangles must be positive, not {self.triangles}")
-        if not 1 <= self.iterations <= MOST_ITERATIONS:
-            raise ValueError(f"iterations must be from 1 to {MOST_ITERATIONS}, not {self.iterations}")
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
+    triangles: int = parameter(TRIANGLES, at_least=1)
+    iterations: int = parameter(ITERATIONS, at_least=1, at_most=MOST_ITERATIONS)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         triangles = sample_triangles(problem, self.triangles, rng)

@@ -5,8 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
 from ._lib.stopwatch import Stopwatch
 
@@ -45,16 +44,10 @@ class Colmap:
     ------
     RuntimeError
         When COLMAP reports failure; its poses would be garbage.
-    ValueError
-        When sigma_deg is not positive.
     """
 
     weight_type: Literal["geman-mcclure", "half-norm"] = "geman-mcclure"
-    sigma_deg: float = 5.0
-
-    def __post_init__(self) -> None:
-        if self.sigma_deg <= 0:
-            raise ValueError(f"sigma_deg must be positive, not {self.sigma_deg:g}")
+    sigma_deg: float = parameter(5.0, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         import pycolmap

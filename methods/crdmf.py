@@ -7,15 +7,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core.problem import Checkpoint, Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Checkpoint, Estimate, Floats, Problem, method, parameter
 
-from . import spectral
 from ._lib.dmf import crdmf_dense, dmf_thin
-from ._lib.dmf.dmf_thin import Factors, Observed, nearest_rotations
+from ._lib.dmf.dmf_thin import Factors, Observed, chordal
+from ._lib.dmf.presets import Presets
 from ._lib.graph.all_triangles import AllTriangles
-from ._lib.graph.starts import SEEDED, Start, start_rotations
-from .spanning_tree import propagated, tree_edges
+from ._lib.graph.trees import propagated, tree_edges
+from ._lib.linear.rounding import nearest_rotations
+from ._lib.starts import SEEDED, Start, start_rotations
+from ._lib.warm_up import solved_once
 
 DEPTHS = (1, 2, 3, 4, 2, 3, 1, 2, 3, 4)  # of the published ten candidates, the different ones first
 FILTER = 1.0  # Frobenius norm, 41.4 degrees
@@ -25,9 +26,9 @@ SMOOTHING_DEG = (20.0, 0.03)
 Run = tuple[Floats, Floats, float]  # rotations (n, 3, 3), edge weights (m,) and loss of a candidate
 
 
-@method("crdmf", title="CRDMF", cite="li2025", requires=("torch", "numba", "scipy"), robust=True, invariant_to_deg=4.0)
+@method("crdmf", title="CRDMF", cite="li2025", requires=("numba", "scipy"), robust=True, invariant_to_deg=4.0)
 @dataclass(frozen=True)
-class CRDMF:
+class CRDMF(Presets):
     """Fits E = P P^T, P having three columns and d factors, to the measured blocks in the weighted l1 norm.
 
     1. Spanning tree: an edge is supported by the triangles at it whose loop error |R_ij R_jk - R_ik| is below the
@@ -86,28 +87,15 @@ class CRDMF:
 
     preset: Literal["thin", "paper"] = "thin"
     init: Literal[Start, None] = None
-    candidates: int | None = None
-    iterations: int | None = None
-    lr: float | None = None
-    momentum: float = 0.9
-    init_scale: float | None = None
+    candidates: int | None = parameter(None, at_least=1, at_most=len(DEPTHS))
+    iterations: int | None = parameter(None, at_least=1)
+    lr: float | None = parameter(None, above=0)
+    momentum: float = parameter(0.9, at_least=0, below=1)
+    init_scale: float | None = parameter(None, above=0)
     device: str | None = None
 
     def __post_init__(self) -> None:
-        """Check the ranges."""
-        for name in ("init_scale", "device") if self.preset == "thin" else ("init",):
-            if getattr(self, name) is not None:
-                raise ValueError(f"parameter '{name}' has no meaning for preset={self.preset}")
-        if self.candidates is not None and not 1 <= self.candidates <= len(DEPTHS):
-            raise ValueError(f"candidates must be between 1 and {len(DEPTHS)}, not {self.candidates}")
-        if self.iterations is not None and self.iterations < 1:
-            raise ValueError(f"iterations must be at least 1, not {self.iterations}")
-        for name in ("lr", "init_scale"):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
-                raise ValueError(f"{name} must be positive, not {value:g}")
-        if not 0 <= self.momentum < 1:
-            raise ValueError(f"momentum must be at least 0 and below 1, not {self.momentum:g}")
+        self.refuse(*(("init_scale", "device") if self.preset == "thin" else ("init",)))
 
     @property
     def deterministic(self) -> bool:
@@ -128,9 +116,7 @@ class CRDMF:
 
     def warm_up(self) -> None:
         """Compile the kernels and load what `solve` imports."""
-        spectral.compile_and_load()
-        triangle = Problem(3, np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32), np.tile(np.eye(3), (3, 1, 1)))
-        replace(self, iterations=3).solve(triangle, np.random.default_rng(0))
+        solved_once(replace(self, iterations=3))
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         clock = time.perf_counter()
@@ -198,7 +184,7 @@ class CRDMF:
             lr=self.lr or 0.05,
             momentum=self.momentum,
             iterations=self._limit,
-            smoothing=(_chordal(SMOOTHING_DEG[0]), _chordal(SMOOTHING_DEG[1])),
+            smoothing=(chordal(SMOOTHING_DEG[0]), chordal(SMOOTHING_DEG[1])),
             report=report,
             weights=blocks,
         )
@@ -242,8 +228,3 @@ def reweighted(problem: Problem, rotations: Floats) -> Floats:
 def _distances(problem: Problem, rotations: Floats) -> Floats:
     """(m,) Frobenius norms of R_ij - R_i R_j^T."""
     return 2 * np.sqrt(2) * np.sin(problem.residuals(rotations) / 2)
-
-
-def _chordal(angle_deg: float) -> float:
-    """Frobenius distance of two rotations at a small angle."""
-    return float(np.sqrt(2) * np.radians(angle_deg))

@@ -5,23 +5,21 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
-from . import spectral
+from ._lib.descent.cycle_refinement import refined
 from ._lib.descent.simplex_descent import consistent_levels
-from ._lib.graph.cemp import inlier_weights, weighted_spectral
-from ._lib.graph.cycle_refinement import refined
-from ._lib.graph.starts import Start, start_rotations
+from ._lib.graph.cemp import inlier_weights
 from ._lib.graph.triangles import codegrees, sample_triangles
-from ._lib.linear import laplacian
+from ._lib.linear.spectral import weighted_spectral
+from ._lib.starts import Refined, Start, start_rotations
 
 FEWEST_TRIANGLES = 30
 
 
-@method("desc", title="DESC", cite="shi2022", requires=("scipy", "numba"), robust=True, deterministic=False)
+@method("desc", title="DESC", cite="shi2022", requires=("scipy", "numba"), robust=True)
 @dataclass(frozen=True)
-class DESC:
+class DESC(Refined):
     """Minimises sum_ij sum_k w_ij,k (s_ik + s_jk), with s_ij = sum_k w_ij,k d_ij,k, for the corruption s of the edges.
 
     1. Take up to `triangles` triangles over each edge and their inconsistencies d_ij,k, the angle of R_ij R_jk R_ki
@@ -55,35 +53,12 @@ class DESC:
         Mean step at which step 4 ends; the published 0.001 rad is 0.057 degrees.
     """
 
-    triangles: int | None = None
-    rate: float = 0.01
-    descent_iterations: int = 100
+    triangles: int | None = parameter(None, at_least=1)
+    rate: float = parameter(0.01, above=0)
+    descent_iterations: int = parameter(100, at_least=1)
     init: Literal[Start, "gcw"] = "gcw"
-    iterations: int = 100
-    tolerance_deg: float = 0.05
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        for name in ("triangles", "rate", "descent_iterations", "iterations", "tolerance_deg"):
-            if getattr(self, name) is not None and not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
-
-    @property
-    def exact_to_deg(self) -> float:
-        """From a random start only as near as the last step tells."""
-        return self.tolerance_deg if self.init == "random" else 1e-6
-
-    @property
-    def invariant_to_deg(self) -> float | None:
-        """A random start ends in whichever minimum is near."""
-        return None if self.init == "random" else 1e-3
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        laplacian.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
+    iterations: int = parameter(100, at_least=1)
+    tolerance_deg: float = parameter(0.05, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         triangles = sample_triangles(problem, self.triangles or _quarter_of_the_median(problem), rng)

@@ -6,13 +6,15 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core.problem import Checkpoint, Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Checkpoint, Estimate, Floats, Problem, method, parameter
 
-from . import spectral
 from ._lib.dmf import dmf_dense, dmf_thin
-from ._lib.dmf.dmf_thin import Factors, Loss, Observed, Report, nearest_rotations
-from ._lib.graph.starts import SEEDED, Start, start_rotations
+from ._lib.dmf.dmf_thin import Factors, Loss, Observed, Report, chordal
+from ._lib.dmf.presets import Presets
+from ._lib.linear.rounding import nearest_rotations
+from ._lib.linear.spectral import spectral_rotations
+from ._lib.starts import SEEDED, Start, start_rotations
+from ._lib.warm_up import solved_once
 
 START_TOLERANCE = 1e-3  # radians; the descent moves further than that
 EXTRA = 0.1  # size of the columns beyond three at a spectral start, relative to a rotation's
@@ -28,11 +30,11 @@ PATIENCE = 0.15  # share of the iterations so far without a better misfit
     "dmf-synch",
     title="DMF-Synch",
     cite="tejus2023",
-    requires=("torch", "numba", "scipy"),
+    requires=("numba", "scipy"),
     robust=True,
 )
 @dataclass(frozen=True)
-class DMFSynch:
+class DMFSynch(Presets):
     """Fits a product of d matrices to the observed blocks by gradient descent on its factors.
 
     Z is the 3n x 3n matrix of all R_i R_j^T, of rank three. Observed are the measured blocks, in both
@@ -113,36 +115,22 @@ class DMFSynch:
 
     preset: Literal["thin", "dense", "paper"] = "thin"
     loss: Literal["l1", "l2", "l1/2", None] = None
-    depth: int | None = None
-    width: int | None = None
-    lr: float | None = None
-    momentum: float = 0.9
-    iterations: int | None = None
-    checkpoint_every: int | None = None
+    depth: int | None = parameter(None, at_least=2)
+    width: int | None = parameter(None, at_least=3)
+    lr: float | None = parameter(None, above=0)
+    momentum: float = parameter(0.9, at_least=0, below=1)
+    iterations: int | None = parameter(None, at_least=1)
+    checkpoint_every: int | None = parameter(None, at_least=1)
     init: Literal[Start, None] = None
-    smoothing_deg: float | None = None
-    init_scale: float | None = None
+    smoothing_deg: float | None = parameter(None, above=0)
+    init_scale: float | None = parameter(None, above=0)
     stop: Literal["misfit", "limit", None] = None
     device: str | None = None
 
     def __post_init__(self) -> None:
-        foreign = ("init_scale", "stop", "device") if self.preset == "thin" else ("init", "smoothing_deg")
-        for name in foreign:
-            if getattr(self, name) is not None:
-                raise ValueError(f"parameter '{name}' has no meaning for preset={self.preset}")
+        self.refuse(*(("init_scale", "stop", "device") if self.preset == "thin" else ("init", "smoothing_deg")))
         if self.preset != "thin" and self.loss == "l1/2":
             raise ValueError(f"preset={self.preset} knows the losses l1 and l2, not l1/2")
-        lowest = {"depth": 2, "width": 3, "iterations": 1, "checkpoint_every": 1}
-        for name, least in lowest.items():
-            value = getattr(self, name)
-            if value is not None and value < least:
-                raise ValueError(f"parameter '{name}' must be at least {least}, not {value}")
-        for name in ("lr", "smoothing_deg", "init_scale"):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
-                raise ValueError(f"parameter '{name}' must be above zero, not {value:g}")
-        if not 0 <= self.momentum < 1:
-            raise ValueError(f"parameter 'momentum' must be at least 0 and below 1, not {self.momentum:g}")
 
     @property
     def layers(self) -> int:
@@ -172,11 +160,7 @@ class DMFSynch:
 
     def warm_up(self) -> None:
         """Compile the kernels and load what `solve` imports."""
-        spectral.compile_and_load()
-        n = max(self.width or 3, 3)
-        chain = np.stack([np.arange(n - 1), np.arange(1, n)], axis=1, dtype=np.int32)
-        problem = Problem(n, chain, np.tile(np.eye(3), (n - 1, 1, 1)))
-        replace(self, iterations=1).solve(problem, np.random.default_rng(0))
+        solved_once(replace(self, iterations=1), cameras=max(self.width or 3, 3))
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         return self._solve_thin(problem, rng) if self.preset == "thin" else self._solve_dense(problem, rng)
@@ -211,7 +195,7 @@ class DMFSynch:
     def _start(
         self, problem: Problem, observed: Observed, scale: Floats, rng: np.random.Generator
     ) -> tuple[Floats, Floats]:
-        """Singular values and vectors of the first product."""
+        """Singular values (w,) and vectors (3n, w) of the first product; `scale` is (3n, 1)."""
         width = min(self.width or 3, 3 * problem.n)
         if self.init == "random":
             wide = min(max(WIDE, width), 3 * problem.n)
@@ -234,7 +218,7 @@ class DMFSynch:
         report: Report | None = None,
     ) -> float:
         loss: Loss = self.loss or "l1/2"
-        last = _chordal(self.smoothing_deg or LAST_SMOOTHING_DEG[loss])
+        last = chordal(self.smoothing_deg or LAST_SMOOTHING_DEG[loss])
         return dmf_thin.descend(
             observed,
             factors,
@@ -242,7 +226,7 @@ class DMFSynch:
             lr=lr,
             momentum=self.momentum,
             iterations=iterations,
-            smoothing=(max(_chordal(FIRST_SMOOTHING_DEG), last), last),
+            smoothing=(max(chordal(FIRST_SMOOTHING_DEG), last), last),
             report=report,
         )
 
@@ -284,8 +268,8 @@ def spectral_start(problem: Problem) -> Floats:
     """
     regularised = 1 / np.sqrt((problem.degree + problem.degree.mean())[problem.edges].prod(axis=1))
     candidates = [
-        spectral.spectral_rotations(problem, tolerance=START_TOLERANCE)[0],
-        spectral.spectral_rotations(problem, regularised, normalised=False, tolerance=START_TOLERANCE)[0],
+        spectral_rotations(problem, tolerance=START_TOLERANCE)[0],
+        spectral_rotations(problem, regularised, normalised=False, tolerance=START_TOLERANCE)[0],
     ]
     return min(candidates, key=lambda rotations: float(problem.residuals(rotations).mean()))
 
@@ -326,11 +310,6 @@ def _singular_values(values: Floats) -> dict[str, float]:
 
 
 def _eigenpairs(columns: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues, descending, and eigenvectors of columns @ columns.T, those of zero left out."""
+    """Eigenvalues (w,), descending, and eigenvectors of columns @ columns.T, `columns` being (3n, w)."""
     vectors, values, _ = np.linalg.svd(columns, full_matrices=False)
     return values**2, vectors
-
-
-def _chordal(angle_deg: float) -> float:
-    """Frobenius distance of two rotations at a small angle."""
-    return float(np.sqrt(2) * np.radians(angle_deg))

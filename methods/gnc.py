@@ -1,75 +1,17 @@
 """Graduated non-convexity: a robust cost reached through costs that are easier to minimise."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
-from . import spectral
 from ._lib.descent.iterate import Iterate, floored, mean_norm
-from ._lib.graph.starts import Start, Started, start_rotations
+from ._lib.descent.surrogates import SURROGATES, GncLoss
 from ._lib.linear.laplacian import LaplacianSolver
+from ._lib.starts import Start, Started, start_rotations
 
-FACTOR = 1.4  # by which the surrogate approaches the cost, as published
-BINARY = 1e-4  # weights this close to 0 or 1 are 0 or 1, as in GTSAM
 LEAST_SQUARES_STEPS = 20  # at most, from the start
-LARGEST_FIRST = 1e6  # mu, where no residual is large enough to be doubted
-
-GncLoss = Literal["tls", "geman-mcclure"]
-
-
-@dataclass(frozen=True)
-class Surrogate:
-    """A family of costs that leads from a nearly convex one to a robust one.
-
-    Its functions take x = (residual / threshold)^2 (m,) and the control parameter mu.
-
-    Parameters
-    ----------
-    cost
-        The robust cost of each edge.
-    weight
-        Weights (m,) of the squared residuals, in [0, 1].
-    first, following
-        mu for the largest x; the mu after a mu.
-    arrived
-        Whether the surrogate with this mu, and with the weights that it gave, is the robust cost.
-    """
-
-    cost: Callable[[Floats], Floats]
-    weight: Callable[[Floats, float], Floats]
-    first: Callable[[float], float]
-    following: Callable[[float], float]
-    arrived: Callable[[float, Floats], bool]
-
-
-def tls_weight(x: Floats, mu: float) -> Floats:
-    """Weights: 1 up to x = mu / (mu + 1), 0 from (mu + 1) / mu, between them sqrt(mu (mu + 1) / x) - mu."""
-    x = np.maximum(x, mu / (mu + 1))
-    # The difference of two numbers that grow with mu, written as one fraction.
-    return np.maximum((mu + mu**2 * (1 - x)) / (x * (np.sqrt(mu * (mu + 1) / x) + mu)), 0.0)
-
-
-SURROGATES: dict[GncLoss, Surrogate] = {
-    "tls": Surrogate(
-        cost=lambda x: np.minimum(x, 1.0),
-        weight=tls_weight,
-        first=lambda largest: 1 / max(2 * largest - 1, 1 / LARGEST_FIRST),
-        following=lambda mu: mu * FACTOR,
-        arrived=lambda mu, weights: bool((np.minimum(weights, 1 - weights) < BINARY).all()),
-    ),
-    "geman-mcclure": Surrogate(
-        cost=lambda x: x / (1 + x),
-        weight=lambda x, mu: (mu / (mu + x)) ** 2,
-        first=lambda largest: max(2 * largest, 1.0),
-        following=lambda mu: max(mu / FACTOR, 1.0),
-        arrived=lambda mu, weights: mu == 1,
-    ),
-}
 
 
 @method("gnc", title="GNC", cite="yang2020", requires=("scipy", "numba"), robust=True)
@@ -110,27 +52,11 @@ class GNC(Started):
     """
 
     loss: GncLoss = "tls"
-    threshold_deg: float = 5.0
+    threshold_deg: float = parameter(5.0, above=0)
     init: Start = "spectral"
-    iterations: int = 100
-    inner_iterations: int = 1
-    tolerance_deg: float = 1e-2
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        for name in ("threshold_deg", "tolerance_deg"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name):g}")
-        if self.iterations < 0:
-            raise ValueError(f"iterations must not be negative, not {self.iterations}")
-        if self.inner_iterations < 1:
-            raise ValueError(f"inner_iterations must be positive, not {self.inner_iterations}")
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
+    iterations: int = parameter(100, at_least=0)
+    inner_iterations: int = parameter(1, at_least=1)
+    tolerance_deg: float = parameter(1e-2, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         surrogate, laplacian = SURROGATES[self.loss], LaplacianSolver(problem)
@@ -153,7 +79,7 @@ class GNC(Started):
         return Estimate(here.rotations, edge_weights=weights, iterations=done, stop_reason=reason, cost=cost)
 
     def _settled(self, here: Iterate, weights: Floats, laplacian: LaplacianSolver, limit: int) -> tuple[Iterate, float]:
-        """Where weighted least squares leads to from `here`, and the mean of the first steps."""
+        """Where least squares with `weights` (m,) leads to from `here`, and the mean of the first steps."""
         lengths: list[float] = []
         while len(lengths) < limit and (not lengths or lengths[-1] >= np.radians(self.tolerance_deg)):
             steps = laplacian.solve(floored(weights), here.vectors)

@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from bench.core.problem import Estimate, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Problem, method, parameter
 
-from . import spectral
-from ._lib.graph.starts import Start, Started, start_rotations
+from ._lib.descent.surrogates import SURROGATES, GncLoss
 from ._lib.gtsam_values import rotations_of, values_of
+from ._lib.starts import Start, Started, start_rotations
 from ._lib.stopwatch import Stopwatch
-from .gnc import SURROGATES, GncLoss
 
 PRIOR_SIGMA = 1.0  # any; a prior on one camera fixes the gauge and costs nothing
 INLIER_COST = 0.5  # GTSAM's cost of a residual at the threshold
@@ -49,15 +47,9 @@ class GtsamGNC(Started):
     """
 
     loss: GncLoss = "tls"
-    threshold_deg: float = 5.0
+    threshold_deg: float = parameter(5.0, above=0)
     init: Start = "spectral"
-    tolerance: float = 1e-5
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        for name in ("threshold_deg", "tolerance"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name):g}")
+    tolerance: float = parameter(1e-5, above=0)
 
     @property
     def invariant_to_deg(self) -> float | None:
@@ -65,12 +57,6 @@ class GtsamGNC(Started):
         if self.init == "random":
             return None
         return 0.1 if self.loss == "geman-mcclure" else 1e-3
-
-    def warm_up(self) -> None:
-        """Compile what the start uses and load GTSAM."""
-        spectral.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         import gtsam

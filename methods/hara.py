@@ -5,16 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import so3
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter, so3
 
 from ._lib.descent.descent import Descent
 from ._lib.descent.losses import LOSSES
 from ._lib.graph.all_triangles import AllTriangles
 from ._lib.graph.hierarchical_tree import hierarchical_tree, support_levels
-from ._lib.linear import laplacian
-from .spanning_tree import tree_edges
+from ._lib.graph.trees import tree_edges
+from ._lib.warm_up import Warm
 
 QUANTILES = (0.1, 0.2, 0.3)
 USUAL_ERROR = 1.0  # squared Frobenius norm, 41.4 degrees; larger loop errors tell nothing of the noise
@@ -23,7 +21,7 @@ ROUNDING = 1e-12  # of a squared Frobenius norm
 
 @method("hara", title="HARA", cite="lee2022", requires=("scipy", "numba"), robust=True)
 @dataclass(frozen=True)
-class HARA:
+class HARA(Warm):
     """Minimises sum_ij sqrt(angle(R_i^T R_ij R_j)) over the edges that agree with a carefully grown spanning tree.
 
     1. List all triangles and their loop errors |R_ij R_jk - R_ik|^2 (Frobenius). The thresholds are the 10, 20 and
@@ -57,26 +55,10 @@ class HARA:
         Mean step at which it ends; the published 0.001 rad is 0.057 degrees.
     """
 
-    support: int = 10
-    filter_deg: float = 41.4
-    irls_iterations: int = 250
-    tolerance_deg: float = 0.05
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.support < 1:
-            raise ValueError(f"support must be at least 1, not {self.support}")
-        for name in ("filter_deg", "tolerance_deg"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
-        if self.irls_iterations < 0:
-            raise ValueError(f"irls_iterations must not be negative, not {self.irls_iterations}")
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        laplacian.compile_and_load()
-        triangle = Problem(3, np.array([[0, 1], [0, 2], [1, 2]], dtype=np.int32), np.tile(np.eye(3), (3, 1, 1)))
-        self.solve(triangle, np.random.default_rng())
+    support: int = parameter(10, at_least=1)
+    filter_deg: float = parameter(41.4, above=0)
+    irls_iterations: int = parameter(250, at_least=0)
+    tolerance_deg: float = parameter(0.05, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         triangles = AllTriangles.of(problem)
@@ -118,7 +100,7 @@ class HARA:
 
 
 def _connecting(problem: Problem, residuals: Floats, kept: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Edges outside `kept`, of the smallest residuals, that a connected graph needs beside those."""
+    """Edges (k,) outside `kept` (m,), of the smallest residuals, that a connected graph needs beside those."""
     if Problem(problem.n, problem.edges[kept], problem.rotations[kept]).components.max() == 0:
         return np.zeros(0, dtype=np.intp)
     tree = tree_edges(problem, 1 / (1 + residuals))

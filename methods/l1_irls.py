@@ -4,15 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Estimate, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Problem, method, parameter, so3
 
-from . import spectral
 from ._lib.descent.descent import Descent
 from ._lib.descent.losses import LOSSES, LossName
-from ._lib.graph.starts import Start, Started, start_rotations
-from ._lib.linear import laplacian
+from ._lib.starts import Start, Started, start_rotations
 
 
 @method("l1-irls", title="L1-IRLS", cite="chatterjee2018", requires=("scipy", "numba"), robust=True)
@@ -57,28 +53,12 @@ class L1IRLS(Started):
         Mean step at which a stage ends; the default is the published 0.001 rad.
     """
 
-    sigma_deg: float = 5.0
+    sigma_deg: float = parameter(5.0, above=0)
     loss: LossName = "geman-mcclure"
     init: Start = "spectral"
-    l1_iterations: int = 10
-    irls_iterations: int = 100
-    tolerance_deg: float = 0.057
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        for name in ("sigma_deg", "tolerance_deg"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
-        for name in ("l1_iterations", "irls_iterations"):
-            if getattr(self, name) < 0:
-                raise ValueError(f"{name} must not be negative, not {getattr(self, name)}")
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        laplacian.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
+    l1_iterations: int = parameter(10, at_least=0)
+    irls_iterations: int = parameter(100, at_least=0)
+    tolerance_deg: float = parameter(0.057, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         loss, sigma = LOSSES[self.loss], np.radians(self.sigma_deg)

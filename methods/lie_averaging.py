@@ -4,13 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core.problem import Estimate, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Problem, method, parameter
 
-from . import spectral
 from ._lib.descent.iterate import Iterate, mean_norm
-from ._lib.graph.starts import Start, Started, start_rotations
 from ._lib.linear.laplacian import LaplacianSolver
+from ._lib.starts import Start, Started, start_rotations
 
 
 @method("lie-averaging", title="Lie-algebraic averaging", cite="govindu2004", requires=("scipy", "numba"))
@@ -40,21 +38,8 @@ class LieAveraging(Started):
     """
 
     init: Start = "spanning-tree"
-    iterations: int = 100
-    tolerance_deg: float = 1e-3
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.iterations < 0:
-            raise ValueError(f"iterations must not be negative, not {self.iterations}")
-        if not self.tolerance_deg > 0:
-            raise ValueError(f"tolerance_deg must be positive, not {self.tolerance_deg:g}")
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
+    iterations: int = parameter(100, at_least=0)
+    tolerance_deg: float = parameter(1e-3, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         here = Iterate.at(problem, start_rotations(self.init, problem, rng))

@@ -5,21 +5,19 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter, so3
 
-from . import spectral
-from ._lib.graph.starts import Seeded, Start, start_rotations
 from ._lib.linear.certificate import certificate_matrix, chordal_cost, multipliers, smallest_eigenvalue
+from ._lib.linear.eigen import smallest
 from ._lib.linear.rounding import nearest_rotations
-from ._lib.linear.smallest import smallest_eigenspace
+from ._lib.starts import Seeded, Start, start_rotations
 
 if TYPE_CHECKING:
     from scipy import sparse
 
 Init = Literal["degrees", Start]
 SPREAD = 0.1  # random part of the columns that an eigenvector iteration starts from
+ANGLE = 1e-6  # radians between the eigenvectors found and the true ones; values are good to the square of it
 ROUNDING = 1e-12  # of the gap, for each edge
 
 
@@ -43,7 +41,7 @@ class MAKS(Seeded):
       the optimum. With the rotations moved first it converges on all scenes tried.
     - They stop when the smallest eigenvalue is below 5e-14. The gap bounds the error of the cost instead.
     - The eigenvectors are those of the smallest eigenvalues, theirs of the nearest to zero; how they are
-      found see `smallest_eigenspace` (theirs: Krylov-Schur iterations on a shifted factorization).
+      found see `smallest` (theirs: Krylov-Schur iterations on a shifted factorization).
     - The estimate is the R of lowest cost, not the last; no camera is turned to the identity.
 
     The weights of a problem are used by the spanning-tree start alone.
@@ -63,19 +61,8 @@ class MAKS(Seeded):
 
     init: Init = "degrees"
     update: Literal["projected", "published"] = "projected"
-    tolerance: float = 1e-8
-    max_iterations: int = 50
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.tolerance < 0:
-            raise ValueError(f"tolerance must not be negative, not {self.tolerance:g}")
-        if self.max_iterations < 1:
-            raise ValueError(f"max_iterations must be at least 1, not {self.max_iterations}")
-
-    def warm_up(self) -> None:
-        """Compile what the starts use and load scipy."""
-        spectral.compile_and_load()
+    tolerance: float = parameter(1e-8, at_least=0)
+    max_iterations: int = parameter(50, at_least=1)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         measurements = problem.block_matrix()
@@ -87,13 +74,13 @@ class MAKS(Seeded):
             dual, columns = self._updated(measurements, first), first.reshape(-1, 3) + noise
         best, lowest, reason, iterations = np.empty(0), np.inf, "iteration limit", 0
         while iterations < self.max_iterations:
-            values, vectors = smallest_eigenspace(certificate_matrix(measurements, dual), columns)
-            rotations = nearest_rotations(vectors)
+            found = smallest(certificate_matrix(measurements, dual), columns, ANGLE)
+            rotations = nearest_rotations(found.vectors)
             iterations += 1
             cost = chordal_cost(problem, rotations)
             if cost < lowest:
                 best, lowest = rotations, cost
-            bound = 6 * problem.m - np.trace(dual, axis1=1, axis2=2).sum() + 3 * problem.n * values[0]
+            bound = 6 * problem.m - np.trace(dual, axis1=1, axis2=2).sum() + 3 * problem.n * found.values[0]
             if lowest - bound <= max(self.tolerance * lowest, ROUNDING * problem.m):
                 reason = f"gap below {self.tolerance:g} of the cost"
                 break

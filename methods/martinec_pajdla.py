@@ -4,15 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method
 
+from ._lib.graph.trees import tree_rotations
 from ._lib.linear.certificate import chordal_cost
-from ._lib.linear.davidson import block_laplacian, smallest_eigenspace
-from ._lib.linear.eigenspace import Eigenspace
-from .spanning_tree import tree_rotations
-from .spectral import PRECISE
+from ._lib.linear.eigen import PRECISE, Eigenspace, smallest
+from ._lib.linear.laplacian import block_laplacian
+from ._lib.linear.rounding import nearest_rotations
+from ._lib.warm_up import large_graphs
 
 
 @method("martinec-pajdla", title="Martinec-Pajdla", cite="martinec2007", requires=("scipy",))
@@ -28,7 +27,7 @@ class MartinecPajdla:
 
     Source: Martinec and Pajdla, CVPR 2007 (there the three right singular vectors of the smallest
     singular values of the stacked equations). Deviations: none in what is computed. Eigenvectors are found by
-    LAPACK up to 100 cameras, else by block Davidson iterations from a spanning tree (see `_davidson`). The weights
+    LAPACK up to 100 cameras, else by block Davidson iterations from a spanning tree (see `smallest`). The weights
     of a problem are not used.
 
     Nothing bounds the size of a camera's block, and a camera with few, contradicting measurements costs least when it
@@ -39,11 +38,8 @@ class MartinecPajdla:
 
     def warm_up(self) -> None:
         """Load what is used of scipy."""
-        n = 120
-        chain = np.stack([np.arange(n - 1), np.arange(1, n)], axis=1)
-        complete = np.stack(np.triu_indices(n, 1), axis=1)
-        for edges in (chain, complete):
-            laplacian_rotations(Problem(n, edges.astype(np.int32), np.tile(np.eye(3), (len(edges), 1, 1))))
+        for problem in large_graphs():
+            laplacian_rotations(problem)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         rotations, found = laplacian_rotations(problem)
@@ -58,8 +54,5 @@ class MartinecPajdla:
 def laplacian_rotations(problem: Problem) -> tuple[Floats, Eigenspace]:
     """Rotations (n, 3, 3) by the steps of `MartinecPajdla`, and the eigenvectors they come from."""
     laplacian = block_laplacian(problem, problem.rotations)
-    found = smallest_eigenspace(problem, laplacian, tree_rotations(problem).reshape(-1, 3))
-    blocks = found.vectors.reshape(-1, 3, 3)
-    if np.sign(np.linalg.det(blocks)).sum() < 0:
-        blocks = blocks * [1.0, 1.0, -1.0]
-    return so3.project(blocks), found
+    found = smallest(laplacian, tree_rotations(problem).reshape(-1, 3))
+    return nearest_rotations(found.vectors), found

@@ -4,22 +4,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
-from . import spectral
+from ._lib.descent.cycle_refinement import refined
 from ._lib.graph.cemp import ITERATIONS, TRIANGLES, corruption_levels, tree_of_least_corruption
-from ._lib.graph.cycle_refinement import refined
-from ._lib.graph.starts import Start, start_rotations
 from ._lib.graph.triangles import sample_triangles
-from ._lib.linear import laplacian
+from ._lib.starts import Refined, Start, start_rotations
 
 BETA = 32.0
 
 
-@method("mpls", title="MPLS", cite="shi2020", requires=("scipy", "numba"), robust=True, deterministic=False)
+@method("mpls", title="MPLS", cite="shi2020", requires=("scipy", "numba"), robust=True)
 @dataclass(frozen=True)
-class MPLS:
+class MPLS(Refined):
     """Least squares whose weights come from the residuals of edges and, by message passing, of their triangles.
 
     1. Estimate the corruption s_ij of each edge by CEMP, from up to `triangles` triangles over it (see `CEMP`).
@@ -46,33 +43,10 @@ class MPLS:
         Mean step at which it ends; the published 0.001 rad is 0.057 degrees.
     """
 
-    triangles: int = TRIANGLES
+    triangles: int = parameter(TRIANGLES, at_least=1)
     init: Start = "cemp-mst"
-    iterations: int = 100
-    tolerance_deg: float = 0.05
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        for name in ("triangles", "iterations", "tolerance_deg"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
-
-    @property
-    def exact_to_deg(self) -> float:
-        """From a random start only as near as the last step tells."""
-        return self.tolerance_deg if self.init == "random" else 1e-6
-
-    @property
-    def invariant_to_deg(self) -> float | None:
-        """A random start ends in whichever minimum is near."""
-        return None if self.init == "random" else 1e-3
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        laplacian.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
+    iterations: int = parameter(100, at_least=1)
+    tolerance_deg: float = parameter(0.05, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         triangles = sample_triangles(problem, self.triangles, rng)

@@ -5,12 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import so3
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
-from ._lib.graph.starts import Seeded, Start, start_rotations
-from .spectral import compile_and_load
+from ._lib.linear.rounding import nearest_rotations
+from ._lib.starts import Seeded, Start, start_rotations
 
 SMALL = 60  # cameras; up to here LAPACK finds all eigenvectors fastest
 EXTRA = 10  # columns beyond the current rank that are iterated
@@ -68,22 +66,10 @@ class NuclearNorm(Seeded):
         Of the primal and the dual residual, relative to the norms of X and of Y.
     """
 
-    strength: float = 0.5
+    strength: float = parameter(0.5, above=0)
     init: Start = "spectral"
-    iterations: int = 200
-    tolerance: float = 2e-3
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        for name in ("strength", "tolerance"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name)}")
-        if self.iterations < 1:
-            raise ValueError(f"iterations must be at least 1, not {self.iterations}")
-
-    def warm_up(self) -> None:
-        """Compile what the spectral start uses and load scipy."""
-        compile_and_load()
+    iterations: int = parameter(200, at_least=1)
+    tolerance: float = parameter(2e-3, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         program = Program(problem, self.strength, start_rotations(self.init, problem, rng))
@@ -149,7 +135,7 @@ class Program:
         self.vectors, self.values = vectors[:, kept], np.sign(values[kept]) * sizes[kept]
 
     def _leading(self, matrix: Floats) -> tuple[Floats, Floats]:
-        """Eigenvalues and eigenvectors of the `matrix` that may be larger than 1 / mu."""
+        """Eigenvalues and eigenvectors of the `matrix` (3n, 3n) that may be larger than 1 / mu."""
         size, width = len(matrix), len(self.values) + EXTRA
         if self._problem.n <= SMALL or 3 * width > size:
             return np.linalg.eigh(matrix)
@@ -168,10 +154,7 @@ class Program:
 
     def rotations(self) -> Floats:
         """Rotations (n, 3, 3): the projected blocks of the three leading eigenvectors of Z."""
-        blocks = self.vectors[:, np.argsort(-self.values, kind="stable")[:3]].reshape(-1, 3, 3)
-        if np.sign(np.linalg.det(blocks)).sum() < 0:
-            blocks = blocks * [1.0, 1.0, -1.0]
-        return so3.project(blocks)
+        return nearest_rotations(self.vectors[:, np.argsort(-self.values, kind="stable")[:3]])
 
     def edge_weights(self) -> Floats:
         """Weight (m,) that reweighted least squares would give each edge: the inverse of its mean misfit in Z."""

@@ -4,14 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter, so3
 
-from ._lib.graph.starts import Start, Started, start_rotations
-from ._lib.linear.davidson import block_laplacian, smallest_eigenspace
-from ._lib.linear.eigenspace import Eigenspace
-from .spectral import PRECISE, compile_and_load
+from ._lib.linear.eigen import PRECISE, Eigenspace, smallest
+from ._lib.linear.laplacian import block_laplacian
+from ._lib.starts import Start, Started, start_rotations
 
 SIGNS_TOLERANCE = 1e-3  # radians, of the solutions that only choose signs
 
@@ -40,7 +37,7 @@ class Quaternion(Started):
 
     Source: Govindu, CVPR 2001 (the linear system). Deviations: the choice of signs, steps 1 and 3, is ours; with
     ``sweeps=1`` they are those of the start. Eigenvectors are found by LAPACK up to 100
-    cameras, else by block Davidson iterations (see `_davidson`). The weights of a problem are used by the
+    cameras, else by block Davidson iterations (see `smallest`). The weights of a problem are used by the
     spanning-tree start alone.
 
     As in `martinec-pajdla`, nothing bounds the norm of a single q_i, and a camera with few, contradicting measurements
@@ -55,16 +52,7 @@ class Quaternion(Started):
     """
 
     init: Start = "spanning-tree"
-    sweeps: int = 50
-
-    def __post_init__(self) -> None:
-        """Check the range."""
-        if self.sweeps < 1:
-            raise ValueError(f"sweeps must be at least 1, not {self.sweeps}")
-
-    def warm_up(self) -> None:
-        """Compile what the spectral start uses and load scipy."""
-        compile_and_load()
+    sweeps: int = parameter(50, at_least=1)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         measured = so3.to_quaternion(problem.rotations)
@@ -100,7 +88,7 @@ def _multiplied(p: Floats, q: Floats) -> Floats:
 def _solved(problem: Problem, signed: Floats, cameras: Floats, tolerance: float) -> Eigenspace:
     """The four eigenvectors of the smallest eigenvalue, from `cameras` (n, 4) in four gauges."""
     start = _from_left(cameras).reshape(-1, 4)
-    return smallest_eigenspace(problem, block_laplacian(problem, _from_left(signed)), start, tolerance)
+    return smallest(block_laplacian(problem, _from_left(signed)), start, tolerance)
 
 
 def _from_left(p: Floats) -> Floats:

@@ -5,13 +5,12 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
-from ._lib.graph.starts import TOLERANCE, Seeded, Start, start_rotations
+from ._lib.linear.rounding import nearest_rotations
+from ._lib.linear.spectral import spectral_rotations
 from ._lib.loops import edge_kernels
-from .spectral import compile_and_load, spectral_rotations
+from ._lib.starts import TOLERANCE, Seeded, Start, start_rotations
 
 SUBSPACE_STEPS = 2  # in each iteration, towards the best approximation of rank three
 NOISE = 0.02  # deviation of the entries of the measured rotations that the published threshold assumes
@@ -64,23 +63,9 @@ class RGoDec(Seeded):
     """
 
     init: Literal["zero-filled", Start] = "zero-filled"
-    threshold: float | None = None
-    iterations: int = 100
-    tolerance: float = 1e-5
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.threshold is not None and not self.threshold > 0:
-            raise ValueError(f"threshold must be positive, not {self.threshold}")
-        if not self.tolerance > 0:
-            raise ValueError(f"tolerance must be positive, not {self.tolerance}")
-        if self.iterations < 1:
-            raise ValueError(f"iterations must be at least 1, not {self.iterations}")
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        compile_and_load()
-        self.solve(Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None]), np.random.default_rng())
+    threshold: float | None = parameter(None, above=0)
+    iterations: int = parameter(100, at_least=1)
+    tolerance: float = parameter(1e-5, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         threshold = self.threshold or NOISE * float(np.sqrt(2 * np.log(18 * problem.m)))
@@ -142,10 +127,7 @@ class Model:
 
     def rotations(self) -> Floats:
         """Rotations (n, 3, 3): the projected blocks of the eigenvectors of L."""
-        blocks = self._basis.reshape(-1, 3, 3)
-        if np.sign(np.linalg.det(blocks)).sum() < 0:
-            blocks = blocks * [1.0, 1.0, -1.0]
-        return so3.project(blocks)
+        return nearest_rotations(self._basis)
 
     def edge_weights(self) -> Floats:
         """Share (m,) of each residual that is left to noise: one where S is zero."""

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core.problem import Estimate, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Problem, method, parameter
 
-from . import spectral
 from ._lib.graph.neighbours import neighbours_of
-from ._lib.graph.starts import Seeded, Start, start_rotations
 from ._lib.linear.certificate import ROUNDING, chordal_cost, smallest_eigenvalue
 from ._lib.loops import camera_kernels
+from ._lib.starts import Seeded, Start, start_rotations
 
 
 @method("rcd", title="RCD", cite="parra2021", requires=("scipy", "numba"), certifies=True)
@@ -44,25 +42,13 @@ class RCD(Seeded):
     """
 
     init: Start = "spectral"
-    tolerance: float = 1e-10
-    max_epochs: int = 1000
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.tolerance < 0:
-            raise ValueError(f"tolerance must not be negative, not {self.tolerance:g}")
-        if self.max_epochs < 1:
-            raise ValueError(f"max_epochs must be at least 1, not {self.max_epochs}")
+    tolerance: float = parameter(1e-10, at_least=0)
+    max_epochs: int = parameter(1000, at_least=1)
 
     @property
     def exact_to_deg(self) -> float:
         """Nothing is promised from a random start: a ring that winds around is a local minimum."""
         return 180.0 if self.init == "random" else 1e-6
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        self.solve(Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None]), np.random.default_rng())
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         rotations = np.array(start_rotations(self.init, problem, rng), order="C")

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
-from . import spectral
 from ._lib.descent.iterate import Iterate, floored, mean_norm
 from ._lib.descent.losses import LOSSES, LossName
-from ._lib.graph.starts import Start, Started, start_rotations
 from ._lib.linear.laplacian import LaplacianSolver
+from ._lib.starts import Start, Started, start_rotations
 
 FIRST_DAMPING, SMALLEST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-8, 1e8  # of the weight of the edges of each camera
 
@@ -51,24 +49,10 @@ class RobustLM(Started):
     """
 
     loss: LossName = "geman-mcclure"
-    sigma_deg: float = 5.0
+    sigma_deg: float = parameter(5.0, above=0)
     init: Start = "spectral"
-    iterations: int = 200
-    tolerance_deg: float = 1e-3
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        for name in ("sigma_deg", "tolerance_deg"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, not {getattr(self, name):g}")
-        if self.iterations < 0:
-            raise ValueError(f"iterations must not be negative, not {self.iterations}")
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
+    iterations: int = parameter(200, at_least=0)
+    tolerance_deg: float = parameter(1e-3, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         loss, scale = LOSSES[self.loss], LOSSES[self.loss].scale(np.radians(self.sigma_deg))

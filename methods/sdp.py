@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
 from ._lib.linear.certificate import chordal_cost, multipliers, smallest_eigenvalue
 from ._lib.linear.rounding import rounded
-from .spectral import compile_and_load, spectral_rotations
+from ._lib.linear.spectral import spectral_rotations
+from ._lib.warm_up import Warm
 
 if TYPE_CHECKING:
     import cvxpy
@@ -30,7 +30,7 @@ SCS_SCALE = 10.0
     max_cameras=300,
 )
 @dataclass(frozen=True)
-class SDP:
+class SDP(Warm):
     """Minimises the sum of squared chordal residuals, with R R^T relaxed to a positive semidefinite matrix.
 
     1. Maximise tr(G X) over positive semidefinite X (3n, 3n) with identities as diagonal blocks; G holds
@@ -69,13 +69,9 @@ class SDP:
     """
 
     solver: Literal["scs", "clarabel"] = "scs"
-    eps: float = 1e-5
-    max_iterations: int = 2000
-    max_cameras: int = 300
-
-    def warm_up(self) -> None:
-        """Compile what the spectral start uses."""
-        compile_and_load()
+    eps: float = parameter(1e-5, above=0)
+    max_iterations: int = parameter(2000, at_least=1)
+    max_cameras: int = parameter(300, at_least=1)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         relaxation = _dual(problem)
@@ -162,6 +158,6 @@ def _status_checked_later() -> Any:
 
 
 def _packed(symmetric: Floats) -> Floats:
-    """Lower triangle, column by column, off-diagonal entries times sqrt(2): SCS's symmetric matrix."""
+    """Lower triangle of a matrix (N, N), column by column, off-diagonal entries times sqrt(2), as SCS wants it."""
     row, col = np.triu_indices(len(symmetric))
     return symmetric[row, col] * np.where(row == col, 1.0, np.sqrt(2))

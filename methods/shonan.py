@@ -5,20 +5,20 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bench.core.problem import Estimate, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Problem, method, parameter
 
 from ._lib.gtsam_values import rotations_of, values_of
 from ._lib.linear.certificate import chordal_cost, smallest_eigenvalue
+from ._lib.linear.spectral import spectral_rotations
 from ._lib.stopwatch import Stopwatch
-from .spectral import compile_and_load, spectral_rotations
+from ._lib.warm_up import Warm
 
 HUBER = 1.345  # GTSAM's threshold, in units of sigma
 
 
 @method("shonan", title="Shonan", cite="dellaert2020", requires=("gtsam", "scipy", "numba"), certifies=True)
 @dataclass(frozen=True)
-class Shonan:
+class Shonan(Warm):
     """Minimises the sum of squared (or Huber) chordal residuals on SO(p), from p = 3 upward until certified.
 
     1. Levenberg-Marquardt on SO(3) from the spectral solution.
@@ -52,25 +52,12 @@ class Shonan:
     tolerance
         Relative decrease of the cost at which Levenberg-Marquardt ends. With 1e-6, GTSAM's for Ceres-like
         parameters, the cost on Ellis Island is 1.7e-6 above the optimum, with 1e-7 1.5e-7.
-
-    Raises
-    ------
-    ValueError
-        When sigma_deg is not positive.
     """
 
     loss: Literal["l2", "huber"] = "l2"
-    sigma_deg: float = 5.0
-    p_max: int = 10
-    tolerance: float = 1e-7
-
-    def __post_init__(self) -> None:
-        if self.sigma_deg <= 0:
-            raise ValueError(f"sigma_deg must be positive, not {self.sigma_deg:g}")
-
-    def warm_up(self) -> None:
-        """Compile what the spectral start uses."""
-        compile_and_load()
+    sigma_deg: float = parameter(5.0, above=0)
+    p_max: int = parameter(10, at_least=3)
+    tolerance: float = parameter(1e-7, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         return self._huber(problem) if self.loss == "huber" else self._l2(problem)

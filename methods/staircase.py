@@ -5,13 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from bench.core.problem import Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Floats, Problem, method, parameter
 
-from . import spectral
-from ._lib.graph.starts import Seeded, Start, start_rotations
 from ._lib.linear.certificate import chordal_cost, smallest_eigenpair, smallest_eigenvalue
 from ._lib.linear.rounding import nearest_rotations
+from ._lib.starts import Seeded, Start, start_rotations
 
 FIRST_STEP = 1.0  # radians, about, at the camera that moves most, when the staircase escapes
 SHORTEST_STEP = 1e-6
@@ -57,23 +55,9 @@ class Staircase(Seeded):
     """
 
     init: Start = "spectral"
-    p_max: int = 10
-    tolerance: float = 1e-8
-    max_iterations: int = 500
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.p_max < 3:
-            raise ValueError(f"p_max must be at least 3, not {self.p_max}")
-        if not self.tolerance > 0:
-            raise ValueError(f"tolerance must be positive, not {self.tolerance:g}")
-        if self.max_iterations < 1:
-            raise ValueError(f"max_iterations must be at least 1, not {self.max_iterations}")
-
-    def warm_up(self) -> None:
-        """Compile what the starts use; load scipy and pymanopt."""
-        spectral.compile_and_load()
-        self.solve(Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None]), np.random.default_rng())
+    p_max: int = parameter(10, at_least=3)
+    tolerance: float = parameter(1e-8, above=0)
+    max_iterations: int = parameter(500, at_least=1)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         points, iterations = start_rotations(self.init, problem, rng), 0
@@ -108,26 +92,24 @@ class Staircase(Seeded):
         measurements, degree = problem.block_matrix(), problem.degree[:, None, None]
 
         def product(x: Floats) -> Floats:
-            """G Y; pymanopt's points are the transposes Y_i^T (p, 3)."""
+            """G Y (n, p, 3); pymanopt's points are the transposes Y_i^T (p, 3)."""
             return _transposed((measurements @ _transposed(x).reshape(-1, p)).reshape(n, 3, p))
 
-        @pymanopt.function.numpy(manifold)
         def cost(x: Floats) -> Any:
             return -0.5 * np.vdot(x, product(x))
 
-        @pymanopt.function.numpy(manifold)
         def gradient(x: Floats) -> Floats:
             return -product(x)
 
-        @pymanopt.function.numpy(manifold)
         def hessian(x: Floats, direction: Floats) -> Floats:
             return -product(direction)
 
+        declared = pymanopt.function.numpy(manifold)
         model = pymanopt.Problem(
             manifold,
-            cost,
-            euclidean_gradient=gradient,
-            euclidean_hessian=hessian,
+            declared(cost),
+            euclidean_gradient=declared(gradient),
+            euclidean_hessian=declared(hessian),
             preconditioner=lambda _, vector: vector / degree,
         )
         start = _transposed(points)
@@ -161,9 +143,11 @@ def _orthonormal(points: Floats) -> Floats:
 
 
 def _rounded(points: Floats) -> Floats:
+    """Rotations (n, 3, 3) from points (n, 3, p), by their three leading right singular vectors."""
     _, _, right = np.linalg.svd(points.reshape(-1, points.shape[2]), full_matrices=False)
     return nearest_rotations(points.reshape(-1, points.shape[2]) @ right[:3].T)
 
 
 def _transposed(x: Floats) -> Floats:
+    """From (n, 3, p) to (n, p, 3) and back, in consecutive memory."""
     return np.ascontiguousarray(np.swapaxes(x, 1, 2))

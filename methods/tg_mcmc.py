@@ -5,20 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Checkpoint, Estimate, Floats, Problem
-from bench.plugins.declare import method
+from bench import Checkpoint, Estimate, Floats, Problem, method, parameter, so3
 
-from . import spectral
-from ._lib.graph.starts import SEEDED, Start, start_rotations
 from ._lib.loops import geodesic_kernels
+from ._lib.starts import SEEDED, Start, Started, start_rotations
 
 CHORDAL = 8.0  # squared Frobenius distance of two rotations over the sine squared of half their angle
 
 
-@method("tg-mcmc", title="TG-MCMC", cite="birdal2018", requires=("scipy", "numba"), exact_to_deg=1e-4)
+@method("tg-mcmc", title="TG-MCMC", cite="birdal2018", requires=("scipy", "numba"))
 @dataclass(frozen=True)
-class TGMCMC:
+class TGMCMC(Started):
     """Minimises sum_ij sin(angle(R_i^T R_ij R_j) / 2)^2, the negative log-likelihood of Bingham noise, by cooling.
 
     A camera is a unit quaternion q_i with a velocity v_i tangent to the sphere. With the potential
@@ -65,29 +62,13 @@ class TGMCMC:
     """
 
     init: Start = "spanning-tree"
-    noise_deg: float = 20.0
-    step: float = 0.39
-    keep: float = 0.9
-    cooling: int = 500
-    iterations: int = 10_000
-    tolerance_deg: float = 1e-6
-    checkpoint_every: int = 100
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.noise_deg < 0:
-            raise ValueError(f"noise_deg must not be negative, not {self.noise_deg}")
-        if not 0 < self.step < 1:
-            raise ValueError(f"step must be between 0 and 1, not {self.step}")
-        if not 0 <= self.keep < 1:
-            raise ValueError(f"keep must be at least 0 and below 1, not {self.keep}")
-        if self.cooling < 0:
-            raise ValueError(f"cooling must not be negative, not {self.cooling}")
-        for name in ("iterations", "checkpoint_every"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
-        if not self.tolerance_deg > 0:
-            raise ValueError(f"tolerance_deg must be positive, not {self.tolerance_deg}")
+    noise_deg: float = parameter(20.0, at_least=0)
+    step: float = parameter(0.39, above=0, below=1)
+    keep: float = parameter(0.9, at_least=0, below=1)
+    cooling: int = parameter(500, at_least=0)
+    iterations: int = parameter(10_000, at_least=1)
+    tolerance_deg: float = parameter(1e-6, above=0)
+    checkpoint_every: int = parameter(100, at_least=1)
 
     @property
     def deterministic(self) -> bool:
@@ -98,17 +79,6 @@ class TGMCMC:
     def exact_to_deg(self) -> float:
         """From a random start a ring can wind around once too often; no promise is made."""
         return 180.0 if self.init == "random" else 1e-4
-
-    @property
-    def invariant_to_deg(self) -> float | None:
-        """A random start may end elsewhere."""
-        return None if self.init == "random" else 1e-3
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         clock = time.perf_counter()
@@ -151,5 +121,6 @@ class TGMCMC:
 
 
 def _checkpoint(iteration: int, clock: float, cameras: Floats, energy: float) -> Checkpoint:
+    """The state of the quaternions `cameras` (n, 4)."""
     rotations = so3.from_quaternion(cameras)
     return Checkpoint(iteration, time.perf_counter() - clock, rotations, {"cost": float(CHORDAL * energy)})

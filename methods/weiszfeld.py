@@ -4,14 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Estimate, Ints, Problem
-from bench.plugins.declare import method
+from bench import Estimate, Ints, Problem, method, parameter, so3
 
-from . import spectral
 from ._lib.graph.neighbours import neighbours_of
-from ._lib.graph.starts import Start, Started, start_rotations
 from ._lib.loops import camera_kernels
+from ._lib.starts import Start, Started, start_rotations
 
 MET = 1e-9  # radians; a prediction this close to the camera counts as met
 
@@ -49,21 +46,8 @@ class Weiszfeld(Started):
     """
 
     init: Start = "spanning-tree"
-    sweeps: int = 1000
-    tolerance_deg: float = 1e-3
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if self.sweeps < 0:
-            raise ValueError(f"sweeps must not be negative, not {self.sweeps}")
-        if not self.tolerance_deg > 0:
-            raise ValueError(f"tolerance_deg must be positive, not {self.tolerance_deg:g}")
-
-    def warm_up(self) -> None:
-        """Compile the kernels and load scipy."""
-        spectral.compile_and_load()
-        two_cameras = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
-        self.solve(two_cameras, np.random.default_rng())
+    sweeps: int = parameter(1000, at_least=0)
+    tolerance_deg: float = parameter(1e-3, above=0)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         cameras = so3.to_quaternion(start_rotations(self.init, problem, rng))
@@ -83,5 +67,6 @@ class Weiszfeld(Started):
 
 
 def _order(problem: Problem) -> Ints:
+    """Cameras (n,) in the order in which they move."""
     angles = np.repeat(so3.angle(problem.rotations), 2)
     return np.lexsort((np.bincount(problem.edges.ravel(), angles), -problem.degree)).astype(np.int32)

@@ -7,7 +7,6 @@ import io
 import json
 import re
 import sys
-import tarfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,9 +17,8 @@ from scenes import UNREGISTERED, bundle_camera, egs_line, write_scene
 from bench.core import so3
 from bench.core.errors import InputError, suggestion
 from bench.core.problem import Instance, Problem
-from bench.datasets._files.archive import damaged, unpack
+from bench.datasets._files.archive import damaged
 from bench.datasets._files.download import Archive
-from bench.datasets.one_dsfm import FILES
 from bench.execution.output import UnusableError, read_output
 from bench.formats import read_graph, toml_file
 from bench.formats.npz import read_topology
@@ -135,15 +133,6 @@ def _plugin(data: bytes, folder: Path) -> object:
             del sys.modules[name]
 
 
-def _archive(data: bytes, folder: Path) -> object:
-    path = folder / "archive.tar.gz"
-    path.write_bytes(data)
-    unpack(path, Archive("http://localhost/archive.tar.gz", "0" * 64, len(data)), folder / "out", FILES, False)
-    outside = {entry.name for entry in folder.iterdir()} - {"archive.tar.gz", "out"}
-    assert not outside, f"written outside: {outside}"
-    return None
-
-
 def _npz(**arrays: object) -> bytes:
     file = io.BytesIO()
     np.savez(file, **arrays)  # type: ignore[arg-type]
@@ -153,16 +142,6 @@ def _npz(**arrays: object) -> bytes:
 def _npz_compressed(**arrays: object) -> bytes:
     file = io.BytesIO()
     np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
-    return file.getvalue()
-
-
-def _tar() -> bytes:
-    file = io.BytesIO()
-    with tarfile.open(fileobj=file, mode="w:gz") as archive:
-        for name in ("x/datasets/Alamo/EGs.txt", "x/datasets/Alamo/cc.txt", "x/readme"):
-            member = tarfile.TarInfo(name)
-            member.size = 5
-            archive.addfile(member, io.BytesIO(b"1 2 3"))
     return file.getvalue()
 
 
@@ -292,7 +271,6 @@ PARSERS: dict[str, Parser] = {
         names_file=False,
     ),
     "plugin": Parser((PLUGIN.encode(),), _plugin, names_file=False),
-    "archive": Parser((_tar(),), _archive, "tar.gz"),
     "manifest": Parser(
         (_json({"archive": "0" * 64, "files": {"Alamo/EGs.txt": "ab"}}),),
         _file("manifest.json", lambda path: damaged(path.parent, Archive("", "0" * 64, 1))),

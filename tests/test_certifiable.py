@@ -11,9 +11,8 @@ from bench.core import so3
 from bench.core.problem import Estimate, Floats, Problem
 from bench.datasets.erdos_renyi import ErdosRenyi
 from bench.methods._lib.graph.neighbours import neighbours_of
-from bench.methods._lib.linear import smallest
+from bench.methods._lib.linear import eigen
 from bench.methods._lib.linear.certificate import certificate_matrix, chordal_cost, multipliers
-from bench.methods._lib.linear.smallest import smallest_eigenspace
 from bench.methods._lib.loops import camera_kernels
 from bench.methods.bcd import BCD
 from bench.methods.maks import MAKS
@@ -122,7 +121,7 @@ def test_a_coordinate_step_survives_singular_sums(kind: str) -> None:
         np.testing.assert_allclose(rotations[0], so3.project(matrix), atol=1e-12)
 
 
-@pytest.mark.parametrize("path", ["lapack", "dense factors", "sparse factors", "products"])
+@pytest.mark.parametrize("path", ["lapack", "factors", "diagonal"])
 @pytest.mark.parametrize("edges", [random_edges(60, 0.2), grid_edges(5, 14)], ids=["random", "grid"])
 def test_the_smallest_eigenvalues_are_those_of_lapack(
     monkeypatch: pytest.MonkeyPatch, path: str, edges: np.ndarray
@@ -131,14 +130,11 @@ def test_the_smallest_eigenvalues_are_those_of_lapack(
     measurements = problem.block_matrix()
     rotations = Staircase(max_iterations=1).solve(problem, RNG).rotations
     matrix = certificate_matrix(measurements, multipliers(measurements, rotations))
-    monkeypatch.setattr(smallest, "SMALL", 10**6 if path == "lapack" else 0)
-    monkeypatch.setattr(smallest, "DENSE", 10**6 if path == "dense factors" else 0)
-    monkeypatch.setattr(smallest, "DENSE_SHARE", 1.0)
-    monkeypatch.setattr(smallest, "FACTORED", 0 if path == "products" else 10**6)
-    monkeypatch.setattr(smallest, "NARROW", 0.0)
-    values, vectors = smallest_eigenspace(matrix, np.random.default_rng(1).standard_normal((3 * problem.n, 3)))
-    np.testing.assert_allclose(values, np.linalg.eigvalsh(matrix.toarray())[:3], atol=1e-8)
-    np.testing.assert_allclose(matrix @ vectors, vectors * values, atol=1e-3)
+    monkeypatch.setattr(eigen, "SMALL", 10**6 if path == "lapack" else 0)
+    monkeypatch.setattr(eigen, "NARROW", 1.0 if path == "factors" else 0.0)
+    found = eigen.smallest(matrix, np.random.default_rng(1).standard_normal((3 * problem.n, 3)), 1e-6)
+    np.testing.assert_allclose(found.values, np.linalg.eigvalsh(matrix.toarray())[:3], atol=1e-8)
+    np.testing.assert_allclose(matrix @ found.vectors, found.vectors * found.values, atol=1e-3)
 
 
 def test_the_relaxed_cost_of_maks_bounds_the_optimum_from_below() -> None:
@@ -156,15 +152,6 @@ def test_limits_are_reported() -> None:
         estimate = method.solve(problem, RNG)
         assert estimate.iterations == 1
         assert "limit" in estimate.stop_reason
-
-
-@pytest.mark.parametrize("method", OURS)
-def test_impossible_parameters_are_refused(method: Any) -> None:
-    with pytest.raises(ValueError, match="tolerance must"):
-        method(tolerance=-1.0)
-    limit = "max_epochs" if method in (RCD, BCD) else "max_iterations"
-    with pytest.raises(ValueError, match=limit):
-        method(**{limit: 0})
 
 
 @pytest.mark.real_data

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.methods._lib.graph.starts import SEEDED
+from bench.methods._lib.starts import SEEDED
 from bench.plugins.catalog import catalog
 from bench.running.conformance import CHECKS, check_method
 

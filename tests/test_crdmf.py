@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
-from bench.core.errors import InputError
 from bench.core.problem import Ints
 from bench.methods._lib.dmf import dmf_thin
 from bench.methods._lib.dmf.crdmf_dense import SymmetricFactorization
 from bench.methods.crdmf import CRDMF, agrees_with_tree, reweighted
 from bench.methods.spectral import Spectral
-from bench.plugins.catalog import catalog
 from bench.plugins.declare import Source
 
 NOISY = random_edges(60, 0.5)
@@ -138,16 +136,6 @@ def test_the_paper_preset_withstands_outliers() -> None:
     problem, truth = simulated(random_edges(30, 0.6), noise_deg=2, outliers=0.15)
     estimate = CRDMF(preset="paper", candidates=2, iterations=2000).solve(problem, rng())
     assert np.median(errors_deg(estimate.rotations, truth)) < 2
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["crdmf[candidates=11]", "crdmf[iterations=0]", "crdmf[momentum=1.0]", "crdmf[device=cpu]",
-     "crdmf[preset=paper,init=spectral]"],
-)  # fmt: skip
-def test_impossible_parameters_are_refused(text: str) -> None:
-    with pytest.raises(InputError):
-        catalog("method").select([text])
 
 
 @pytest.mark.real_data

@@ -12,8 +12,8 @@ from bench.core.problem import Estimate, Floats, Problem
 from bench.datasets.erdos_renyi import ErdosRenyi
 from bench.methods._lib.descent.simplex_descent import consistent_levels
 from bench.methods._lib.graph.cemp import corruption_levels
-from bench.methods._lib.graph.starts import start_rotations
 from bench.methods._lib.graph.triangles import Triangles, codegrees, sample_triangles
+from bench.methods._lib.starts import start_rotations
 from bench.methods.cemp import CEMP
 from bench.methods.desc import DESC
 from bench.methods.l1_irls import L1IRLS
@@ -211,23 +211,6 @@ def test_a_graph_without_triangles_is_solved(method: CEMP | MPLS | DESC) -> None
     assert errors_deg(method.solve(problem, rng()).rotations, truth).max() < 1e-6
 
 
-@pytest.mark.parametrize(
-    ("cls", "parameters"),
-    [
-        (CEMP, {"triangles": 0}),
-        (CEMP, {"iterations": 11}),
-        (MPLS, {"triangles": 0}),
-        (MPLS, {"tolerance_deg": 0.0}),
-        (DESC, {"rate": 0.0}),
-        (DESC, {"triangles": 0}),
-    ],
-    ids=str,
-)
-def test_impossible_parameters_are_refused(cls: type, parameters: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=next(iter(parameters))):
-        cls(**parameters)
-
-
 @pytest.mark.real_data
 def test_ellis_island(real_data: Path) -> None:
     from bench.datasets.one_dsfm import OneDSfM
@@ -240,3 +223,17 @@ def test_ellis_island(real_data: Path) -> None:
         found = errors_deg(method.solve(instance.problem, rng()).rotations, instance.truth)  # type: ignore[attr-defined]
         assert found.mean() < mean
         assert np.median(found) < median
+
+
+def test_places_without_a_triangle_hold_no_leftovers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fresh memory may hold anything, and dividing that warned in one call of five."""
+    monkeypatch.setattr("bench.methods._lib.graph.triangles.np.empty", leftovers)
+    problem, _ = simulated(random_edges(30, 0.2), noise_deg=5)
+    triangles = sample_triangles(problem, ALL, rng())
+    unfilled = np.arange(triangles.inconsistency.shape[1]) >= triangles.counts[:, None]
+    assert unfilled.any()
+    assert (triangles.inconsistency[unfilled] == 0).all()
+
+
+def leftovers(shape: int | tuple[int, ...], dtype: type = float) -> np.ndarray:
+    return np.full(shape, np.nan if dtype is float else 7, dtype=dtype)

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
-from bench.core.errors import InputError
 from bench.core.problem import Checkpoint, Ints
 from bench.datasets.one_dsfm import OneDSfM
 from bench.methods._lib.dmf import dmf_thin
 from bench.methods._lib.dmf.dmf_dense import DenseFactorization
 from bench.methods.dmf_synch import DMFSynch
 from bench.methods.spectral import Spectral
-from bench.plugins.catalog import catalog
 from bench.plugins.declare import Source
 
 NOISY = random_edges(60, 0.5)
@@ -172,23 +170,6 @@ def test_checkpoints_tell_iteration_seconds_and_singular_values() -> None:
         assert all(np.diff([c.seconds for c in checkpoints]) > 0)
         assert {"cost", "sigma_1", "sigma_2", "sigma_3"} <= checkpoints[0].diagnostics.keys()
         assert checkpoints[0].rotations.shape == (8, 3, 3)
-
-
-@pytest.mark.parametrize(
-    ("selection", "complaint"),
-    [
-        ("dmf-synch[init_scale=1]", "'init_scale' has no meaning for preset=thin"),
-        ("dmf-synch[preset=dense,init=random]", "'init' has no meaning for preset=dense"),
-        ("dmf-synch[preset=dense,loss=l1/2]", "not l1/2"),
-        ("dmf-synch[depth=1]", "'depth' must be at least 2, not 1"),
-        ("dmf-synch[lr=0]", "'lr' must be above zero"),
-        ("dmf-synch[momentum=1]", "'momentum' must be"),
-        ("dmf-synch[loss=l3]", "takes l1 or l2 or l1/2 or none"),
-    ],
-)
-def test_parameters_that_make_no_sense_are_refused(selection: str, complaint: str) -> None:
-    with pytest.raises(InputError, match=complaint):
-        catalog("method").select([selection])
 
 
 @pytest.mark.real_data

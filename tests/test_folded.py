@@ -72,15 +72,6 @@ def test_the_seed_and_the_parameters_decide() -> None:
     assert sources[0].seeded
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("n", 3), ("share", 1.1), ("agreeing", -0.1), ("across", 2.0), ("angle_deg", 181.0), ("noise_deg", -1.0)],
-)
-def test_parameters_out_of_range_are_refused(name: str, value: float) -> None:
-    with pytest.raises(ValueError, match=name):
-        Folded(**{name: value})  # type: ignore[arg-type]
-
-
 def test_parts_that_are_never_joined_are_refused() -> None:
     with pytest.raises(InputError, match="choose a smaller missing, or a larger across or n"):
         load(Folded(n=10, across=0.0))

@@ -138,12 +138,6 @@ def test_the_filter_never_disconnects() -> None:
     assert np.isfinite(estimate.rotations).all()
 
 
-@pytest.mark.parametrize("parameters", [{"support": 0}, {"filter_deg": 0.0}, {"irls_iterations": -1}], ids=str)
-def test_impossible_parameters_are_refused(parameters: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=next(iter(parameters))):
-        HARA(**parameters)  # type: ignore[arg-type]
-
-
 @pytest.mark.real_data
 def test_ellis_island(real_data: Path) -> None:
     """Published on the whole component: 2.1 mean, 2.6 without refinement, 2.5 without the filter."""

@@ -8,10 +8,10 @@ from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
 from bench.core import so3
 from bench.core.problem import Floats, Ints, Problem
-from bench.methods._lib.linear.davidson import block_laplacian, smallest_eigenspace
+from bench.methods._lib.linear.eigen import PRECISE, smallest
+from bench.methods._lib.linear.laplacian import block_laplacian
 from bench.methods.martinec_pajdla import MartinecPajdla, laplacian_rotations
 from bench.methods.quaternion import Quaternion
-from bench.methods.spectral import PRECISE
 
 RNG = np.random.default_rng(0)  # only random starts draw from it
 SMALL = random_edges(20, 0.3)
@@ -66,7 +66,7 @@ def test_eigenvectors_of_any_laplacian_agree_with_a_dense_eigensolver(edges: Int
     dense = dense_laplacian(problem, blocks)
     np.testing.assert_allclose(laplacian.toarray(), dense, atol=1e-12)
     start = np.random.default_rng(4).standard_normal((4 * problem.n, 2))
-    found = smallest_eigenspace(problem, laplacian, start)
+    found = smallest(laplacian, start)
     reference = np.linalg.eigh(dense)[1][:, :2]
     np.testing.assert_allclose(np.linalg.svd(reference.T @ found.vectors)[1], 1, atol=1e-10)
 
@@ -102,11 +102,6 @@ def test_signs_do_not_depend_on_the_start_where_there_are_no_outliers() -> None:
     problem, _ = simulated(RANDOM, noise_deg=5)
     tree, random = (Quaternion(init=init).solve(problem, RNG) for init in ("spanning-tree", "random"))  # type: ignore[arg-type]
     assert errors_deg(tree.rotations, random.rotations).max() < 1e-5
-
-
-def test_impossible_parameters_are_refused() -> None:
-    with pytest.raises(ValueError, match="sweeps"):
-        Quaternion(sweeps=0)
 
 
 @pytest.mark.real_data

@@ -96,21 +96,6 @@ def test_the_subspace_iteration_finds_the_optimum_of_lapack(monkeypatch: pytest.
     assert method.solve(problem, RNG).cost == pytest.approx(exact.cost, rel=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("method", "parameters"),
-    [
-        (RGoDec, {"threshold": 0.0}),
-        (RGoDec, {"tolerance": 0.0}),
-        (RGoDec, {"iterations": 0}),
-        (NuclearNorm, {"strength": -1.0}),
-        (NuclearNorm, {"iterations": 0}),
-    ],
-)
-def test_impossible_parameters_are_refused(method: type, parameters: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=next(iter(parameters))):
-        method(**parameters)
-
-
 @pytest.mark.real_data
 def test_ellis_island(real_data: Path) -> None:
     from bench.datasets.one_dsfm import OneDSfM

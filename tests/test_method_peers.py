@@ -170,12 +170,6 @@ def test_colmap_trees_follow_the_weights() -> None:
     assert np.median(errors_deg(Colmap().solve(weighted, RNG).rotations, truth)) < 1
 
 
-@pytest.mark.parametrize("method", [Shonan, Colmap])
-def test_a_scale_that_is_not_positive_is_refused(method: type[Shonan] | type[Colmap]) -> None:
-    with pytest.raises(ValueError, match="sigma_deg must be positive, not 0"):
-        method(sigma_deg=0)
-
-
 @pytest.mark.real_data
 @pytest.mark.parametrize(
     ("method", "mean_deg", "median_deg"),

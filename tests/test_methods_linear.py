@@ -1,14 +1,21 @@
 """Spanning trees and spectral synchronization: where they are exact, and what they are invariant to."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
+from scipy import sparse
 
 from bench.core import so3
 from bench.core.problem import Floats, Ints, Problem
-from bench.methods._lib.linear.eigenspace import leading_eigenspace
-from bench.methods.spanning_tree import SpanningTree, tree_edges
-from bench.methods.spectral import Spectral, spectral_rotations
+from bench.methods._lib.graph.trees import tree_edges
+from bench.methods._lib.linear import eigen
+from bench.methods._lib.linear.eigen import leading
+from bench.methods._lib.linear.spectral import spectral_rotations
+from bench.methods.martinec_pajdla import MartinecPajdla
+from bench.methods.spanning_tree import SpanningTree
+from bench.methods.spectral import Spectral
 
 RNG = np.random.default_rng(0)  # the methods here draw nothing from it
 COMPLETE = random_edges(120, 1.0)
@@ -105,9 +112,69 @@ def test_edge_weights_silence_outliers(edges: Ints) -> None:
 def test_the_eigensolver_finds_a_triple_eigenvalue_and_says_how_well() -> None:
     start = np.random.default_rng(0).standard_normal((400, 3))
     triple = np.concatenate([np.linspace(-1, 0.9, 397), np.ones(3)])[:, None]
-    found = leading_eigenspace(lambda x: triple * x, start, 1e-9)
+    found = leading(lambda x: triple * x, start, 1e-9)
     assert found.error <= 1e-9
     assert np.abs(found.vectors[:397]).max() < 1e-8
-    stopped = leading_eigenspace(lambda x: triple * x, start, 1e-9, most_products=3)
+    stopped = leading(lambda x: triple * x, start, 1e-9, most_products=3)
     assert stopped.products == 3
     assert stopped.error > 1e-3
+
+
+# --- eigenvalues that coincide -----------------------------------------------------------------------
+
+
+def star(leaves: int) -> Ints:
+    return np.array([[0, k] for k in range(1, leaves + 1)], dtype=np.int32)
+
+
+def ring(n: int) -> Ints:
+    return np.array([[0, n - 1], *([k, k + 1] for k in range(n - 1))], dtype=np.int32)
+
+
+@pytest.mark.parametrize("noise_deg", [0.0, 5.0])
+@pytest.mark.parametrize("method", [Spectral(), Spectral(normalised=False), MartinecPajdla()], ids=str)
+def test_stars_are_solved_whatever_the_number_of_cameras(method: Spectral | MartinecPajdla, noise_deg: float) -> None:
+    """Nothing contradicts the measurements of a tree: its solution fits them all. Most eigenvalues coincide."""
+    for leaves in (*range(2, 60), 99, 100, 130):
+        problem, _ = simulated(star(leaves), noise_deg=noise_deg, seed=leaves)
+        rotations = method.solve(problem, RNG).rotations
+        assert np.degrees(problem.residuals(rotations)).max() < 1e-5, leaves
+
+
+@pytest.mark.parametrize("graph", [ring, lambda n: random_edges(n, 1.0)], ids=["ring", "complete"])
+def test_rings_and_complete_graphs_of_any_size_are_solved(graph: Callable[[int], Ints]) -> None:
+    for n in (*range(3, 40), 100, 101):
+        problem, truth = simulated(graph(n), seed=n)
+        for method in (Spectral(), Spectral(normalised=False), MartinecPajdla()):
+            assert errors_deg(method.solve(problem, RNG).rotations, truth).max() < 1e-6, (n, method)
+
+
+@pytest.mark.parametrize("multiplicities", [[3, 27], [27, 3], [1] * 30, [3, 1, 22, 4], [10, 10, 10], [2, 2, 26], [30]])
+def test_every_eigenpair_asked_for_comes_whatever_the_multiplicities(multiplicities: list[int]) -> None:
+    rng = np.random.default_rng(0)
+    values = np.repeat(np.arange(len(multiplicities)) - 1.5, multiplicities)
+    for size in (30, 330):  # LAPACK, and iterations
+        spectrum = np.sort(np.tile(values, size // 30))
+        basis = np.linalg.qr(rng.standard_normal((size, size)))[0]
+        matrix = (basis * spectrum) @ basis.T
+        positive = matrix + 3 * np.eye(size)
+        for count in (3, 4):
+            start = rng.standard_normal((size, count))
+            low = eigen.smallest(sparse.bsr_array(positive, blocksize=(3, 3)), start)
+            high = eigen.leading_of_dense(matrix, count) if size == 30 else leading(lambda x, a=matrix: a @ x, start)
+            for found, wanted, scaled in (
+                (low, spectrum[:count] + 3, positive),
+                (high, spectrum[-count:], matrix),
+            ):
+                np.testing.assert_allclose(found.values, wanted, atol=1e-9)
+                np.testing.assert_allclose(found.vectors.T @ found.vectors, np.eye(count), atol=1e-10)
+                np.testing.assert_allclose(scaled @ found.vectors, found.vectors * found.values, atol=1e-4)
+
+
+def test_degrees_are_divided_out_unless_one_asks_otherwise() -> None:
+    """Along a trajectory that hangs on a clique the plain eigenvectors sink below rounding; the default's do not."""
+    trajectory = [[k, k + 1] for k in range(19, 60)]
+    edges = np.concatenate([random_edges(20, 1.0), np.array(trajectory, dtype=np.int32)])
+    problem, truth = simulated(edges)
+    assert errors_deg(Spectral().solve(problem, RNG).rotations, truth).max() < 1e-6
+    assert errors_deg(Spectral(normalised=False).solve(problem, RNG).rotations, truth).max() > 10

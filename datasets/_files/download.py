@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 from urllib.parse import urlsplit
 
-from bench.core.errors import InputError
+from bench import InputError
+
+from .progress import progress_bar
 
 if TYPE_CHECKING:
     from http.client import HTTPResponse
@@ -87,8 +89,6 @@ def sha256_of(path: Path) -> str:
 def _receive(archive: Archive, part: Path, progress: bool) -> None:
     import urllib.request
 
-    from tqdm import tqdm
-
     have = part.stat().st_size if part.is_file() else 0
     if have >= archive.size:
         return
@@ -98,14 +98,14 @@ def _receive(archive: Archive, part: Path, progress: bool) -> None:
         have = _start(response, have, archive)
         with _writing(part):
             file = part.open("ab" if have else "wb", buffering=0)
-        with file, tqdm(total=archive.size, initial=have, unit="B", unit_scale=True, disable=not progress) as bar:
+        with file, progress_bar("download", archive.size, progress) as update:
             while have <= archive.size and (chunk := response.read1(_CHUNK)):
                 rest = memoryview(chunk)
                 with _writing(part):
                     while rest:
                         rest = rest[file.write(rest) :]
                 have += len(chunk)
-                bar.update(len(chunk))
+                update(have)
 
 
 def _start(response: "HTTPResponse", have: int, archive: Archive) -> int:

@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from bench.core.errors import InputError
+from bench import InputError
 
 VARIABLE = "ROTSYNC_DATA_DIR"
 

@@ -1,5 +1,6 @@
 """Simulated measurements on the edges of a graph: noise on all, and outliers in place of some."""
 
+import inspect
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
@@ -7,16 +8,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import seeds, so3
-from bench.core.problem import Floats, Ints
+from bench import Floats, Ints, so3, stream
 
+from . import graphs
 from . import noise as noise_models
 from .noise import Noise
 
 OutlierModel = Literal["haar", "authors"]
 
 # The files that decide what is simulated; part of the revision of every simulated instance.
-CODE = tuple(Path(str(file)) for file in (__file__, noise_models.__file__, so3.__file__, seeds.__file__))
+_FILES = (__file__, graphs.__file__, noise_models.__file__, so3.__file__, inspect.getfile(stream))
+CODE = tuple(Path(str(file)) for file in _FILES)
 
 
 @dataclass(frozen=True)
@@ -32,24 +34,12 @@ class Measurements:
     outlier_model
         ``haar``: uniform rotations. ``authors``: the rotation nearest to a matrix with entries uniform on
         [0, 1], as in the code of Tejus et al. (2023), which is biased towards one part of SO(3).
-
-    Raises
-    ------
-    ValueError
-        On a number out of range.
     """
 
     noise_deg: float = 5.0
     outliers: float = 0.4
     outlier_model: OutlierModel = "haar"
     noise: Noise = "paper"
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if not 0 <= self.noise_deg <= 180:
-            raise ValueError(f"noise_deg must be from 0 to 180, not {self.noise_deg}")
-        if not 0 <= self.outliers <= 1:
-            raise ValueError(f"outliers must be from 0 to 1, not {self.outliers}")
 
     @classmethod
     def of(cls, dataset: object) -> "Measurements":
@@ -91,6 +81,7 @@ class Measurements:
         return [parts[field.name] for field in fields(self) if getattr(self, field.name) != field.default]
 
     def _outlying(self, rng: np.random.Generator, count: int) -> Floats:
+        """Rotations (count, 3, 3) in place of measurements."""
         if self.outlier_model == "authors":
             return so3.project(rng.random((count, 3, 3)))
         return so3.random(rng, count)

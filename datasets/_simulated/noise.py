@@ -8,8 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Floats
+from bench import Floats, so3
 
 Noise = Literal["paper", "tangent", "langevin"]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.core.problem import Problem
+from bench import Problem
 
 _DENSE = 500  # cameras, above which the sparse solver is quicker
 

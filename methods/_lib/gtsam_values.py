@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.core.problem import Floats
+from bench import Floats
 
 
 def values_of(rotations: Floats) -> Any:

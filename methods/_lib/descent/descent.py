@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.core.problem import Floats, Problem
+from bench import Floats, Problem
 
 from ..linear.laplacian import LaplacianSolver
 from ..loops import edge_kernels
@@ -42,7 +42,7 @@ class Descent:
         return False
 
     def step(self, weights: Floats, longest: float = np.inf) -> float:
-        """Move every camera to the minimum of the linearised problem; the mean step in radians.
+        """Move every camera to the minimum of the problem linearised with `weights` (m,); the mean step in radians.
 
         Where that is above `longest`, the cameras move on beyond the minimum, by `RELAXATION`.
         """
@@ -60,6 +60,7 @@ class Descent:
 
 
 def _quaternions(rotations: Floats) -> Floats:
+    """Unit quaternions (k, 4) of rotations (k, 3, 3)."""
     result = np.empty((len(rotations), 4))
     edge_kernels.quaternions(rotations, result)
     return result

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Floats, Ints, Problem
+from bench import Floats, Ints, Problem, so3
 
 from ..loops import edge_kernels
 
@@ -63,6 +62,7 @@ def floored(weights: Floats) -> Floats:
 
 
 def _measured(edges: Ints, measured: Floats, cameras: Floats) -> Iterate:
+    """The iterate with these `cameras` (n, 4); shapes as in `Iterate`."""
     vectors, angles = np.empty((len(edges), 3)), np.empty(len(edges))
     edge_kernels.edge_residuals(edges, measured, cameras, vectors, angles)
     return Iterate(edges, measured, cameras, vectors, angles)

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core.problem import Floats
+from bench import Floats
 
 LossName = Literal[
     "geman-mcclure",
@@ -61,13 +61,13 @@ _MAGSAC_TAIL = np.exp(-(MAGSAC_CUT**2) / 2)
 
 
 def magsac_value(x: Floats) -> Floats:
-    """Loss with the weight `magsac_weight`; constant from the cut on."""
+    """Loss (m,) with the weight `magsac_weight` at x (m,); constant from the cut on."""
     square = np.minimum(x**2, MAGSAC_CUT**2 / 2)
     return (-np.expm1(-square) - _MAGSAC_TAIL * square) / (2 * (1 - _MAGSAC_TAIL))
 
 
 def magsac_weight(x: Floats) -> Floats:
-    """Likelihood of a residual, averaged over the noise levels up to sigma; x is residual / (sqrt(2) sigma).
+    """Likelihood (m,) of residuals x (m,), averaged over the noise levels up to sigma; x is residual / (sqrt(2) sigma).
 
     MAGSAC++ (Barath et al., CVPR 2020) takes the residual for the length of a normal vector, cut at its 99 %
     quantile k, whose standard deviation is uniform on [0, sigma]. With the three degrees of freedom of a

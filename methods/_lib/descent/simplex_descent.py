@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench.core.problem import Floats, Ints
+from bench import Floats, Ints
 
 from ..graph.triangles import Triangles
 from ..loops.edge_kernels import compiled

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.core.problem import Floats, Problem
+from bench import Floats, Problem
 
 if TYPE_CHECKING:
     import torch

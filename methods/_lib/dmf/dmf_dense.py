@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from bench.core.problem import Floats, Problem
+from bench import Floats, Problem
 
 if TYPE_CHECKING:
     import torch
@@ -94,6 +94,7 @@ class DenseFactorization:
 
 
 def _leading(matrix: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (4,), descending, and eigenvectors (N, 4) of a symmetric matrix (N, N)."""
     if not np.isfinite(matrix).all():
         raise FloatingPointError("the product diverged; a smaller lr may help")
     if len(matrix) <= SMALL:

@@ -8,8 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import so3
-from bench.core.problem import Floats, Problem
+from bench import Floats, Problem
 
 Single = NDArray[np.float32]
 Loss = Literal["l1", "l2", "l1/2"]
@@ -87,7 +86,7 @@ class Factors:
         return cls((vectors * root).astype(np.float32), middle)
 
     def partial_products(self) -> tuple[list[Single], list[Single]]:
-        """Products of the middle factors before each, and after each; the last and the first are of all."""
+        """Products (w, w) of the middle factors before each, and after each; the last and the first are of all."""
         identity = np.eye(self.end.shape[1], dtype=np.float32)
         before, after = [identity], [identity]
         for factor in self.middle:
@@ -104,12 +103,9 @@ class Factors:
         return values[::-1], (basis @ vectors)[:, ::-1]
 
 
-def nearest_rotations(vectors: Floats) -> Floats:
-    """Rotations (n, 3, 3) nearest to the blocks of three columns (3n, 3), known up to one reflection."""
-    blocks = vectors.reshape(-1, 3, 3)
-    if np.sign(np.linalg.det(blocks)).sum() < 0:
-        blocks = blocks * [1.0, 1.0, -1.0]
-    return so3.project(blocks)
+def chordal(angle_deg: float) -> float:
+    """Frobenius distance of two rotations at a small angle."""
+    return float(np.sqrt(2) * np.radians(angle_deg))
 
 
 def descend(

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import so3
-from bench.core.problem import Floats, Ints, Problem
+from bench import Floats, Ints, Problem, so3
 
 from ..loops.edge_kernels import compiled
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import so3
-from bench.core.problem import Floats, Ints, Problem
+from bench import Floats, Ints, Problem, so3
 
 from ..loops.edge_kernels import compiled
 from .all_triangles import AllTriangles
@@ -39,7 +38,7 @@ def support_levels(problem: Problem, triangles: AllTriangles, thresholds: Floats
 
 
 def hierarchical_tree(problem: Problem, levels: Ints, lost: int) -> Tree:
-    """Grow a tree from the camera of highest degree, along edges of the lowest possible level.
+    """Grow a tree from the camera of highest degree, along edges of the lowest possible of `levels` (m,).
 
     Of the cameras that can branch out at that level, the one with the most neighbours outside the tree does, to all of
     them that the level reaches. Where all edges that leave the tree are at level `lost`, the outside camera with the

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.core.problem import Floats, Ints, Problem
+from bench import Floats, Ints, Problem
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import so3
-from bench.core.problem import Floats, Ints, Problem
+from bench import Floats, Ints, Problem, so3
 
 from ..loops.edge_kernels import compiled
 
@@ -65,7 +64,7 @@ def sample_triangles(problem: Problem, most: int, rng: np.random.Generator) -> T
     counts = np.empty(problem.m, dtype=np.int32)
     sides = np.empty((problem.m, most, 2), dtype=np.int32)
     _sample(offsets, neighbours, ids, int(rng.integers(2**32)), counts, sides)
-    inconsistency = np.empty((problem.m, most))
+    inconsistency = np.zeros((problem.m, most))  # all of it is divided
     _cycle_angles(problem.edges, so3.to_quaternion(problem.rotations), counts, sides, inconsistency)
     inconsistency /= np.pi
     return Triangles(counts, sides, inconsistency)
@@ -79,13 +78,14 @@ def codegrees(problem: Problem) -> Ints:
 
 
 def _neighbours(problem: Problem) -> tuple[Ints, Ints, Ints]:
-    """CSR lists: where the list of each camera begins, its neighbours, and the indices of the edges to them."""
+    """CSR lists: where that of each camera begins (n + 1,), its neighbours (2m,), and the edges to them (2m,)."""
     lists = problem.adjacency(np.arange(1.0, problem.m + 1))
     return lists.indptr, lists.indices, lists.data.astype(np.int32) - 1
 
 
 @compiled
 def _count(offsets: Ints, neighbours: Ints, ids: Ints, counts: Ints) -> None:
+    """Fill `counts` (m,), given the lists of `_neighbours`."""
     n = offsets.shape[0] - 1
     marked = np.zeros(n, dtype=np.bool_)
     for i in range(n):
@@ -104,6 +104,7 @@ def _count(offsets: Ints, neighbours: Ints, ids: Ints, counts: Ints) -> None:
 
 @compiled
 def _sample(offsets: Ints, neighbours: Ints, ids: Ints, seed: int, counts: Ints, sides: Ints) -> None:
+    """Fill `counts` (m,) and `sides` (m, k, 2) of `Triangles`, given the lists of `_neighbours`."""
     n, most = offsets.shape[0] - 1, sides.shape[1]
     to_i = np.full(n, -1, dtype=np.int32)
     found = np.empty((n, 2), dtype=np.int32)
@@ -136,7 +137,7 @@ def _sample(offsets: Ints, neighbours: Ints, ids: Ints, seed: int, counts: Ints,
 
 @compiled
 def _cycle_angles(edges: Ints, measured: Floats, counts: Ints, sides: Ints, angles: Floats) -> None:
-    """Angle between R_ij R_jk and R_ik, from the chord between their quaternions."""
+    """Fill `angles` (m, k) between R_ij R_jk and R_ik, from the chord between quaternions `measured` (m, 4)."""
     for e in range(edges.shape[0]):
         i, j = edges[e, 0], edges[e, 1]
         w, x, y, z = measured[e, 0], measured[e, 1], measured[e, 2], measured[e, 3]
@@ -157,6 +158,7 @@ def _cycle_angles(edges: Ints, measured: Floats, counts: Ints, sides: Ints, angl
 
 @compiled
 def _weighted_means(counts: Ints, sides: Ints, inconsistency: Floats, values: Floats, means: Floats) -> None:
+    """Fill `means` (m,), see `Triangles.weighted_means`."""
     for e in range(counts.shape[0]):
         total = weighted = 0.0
         for t in range(counts[e]):

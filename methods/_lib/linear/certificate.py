@@ -4,19 +4,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench.core.problem import Floats, Problem
+from bench import Floats, Problem
 
-from .smallest import DENSE, smallest_eigenspace
+from .eigen import smallest
 
 if TYPE_CHECKING:
     from scipy import sparse
 
 PRECISION = 1e-10  # of the eigenvalue, relative to the largest one
+LARGE = 1200  # rows; from here on one eigenvalue alone is found faster than a block
 ROUNDING = 4e-15  # of the cost, for each edge
 
 
 def chordal_cost(problem: Problem, rotations: Floats) -> float:
-    """Sum over the edges of the squared Frobenius norm of R_ij - R_i R_j^T."""
+    """Sum over the edges of the squared Frobenius norm of R_ij - R_i R_j^T, at R (n, 3, p)."""
     i, j = problem.edges.T
     difference = problem.rotations - rotations[i] @ np.swapaxes(rotations[j], -1, -2)
     return float(np.sum(difference**2))
@@ -37,12 +38,13 @@ def multipliers(measurements: "sparse.csr_array", rotations: Floats) -> Floats:
     return 0.5 * (blocks + np.swapaxes(blocks, -1, -2))
 
 
-def certificate_matrix(measurements: "sparse.csr_array", blocks: Floats) -> "sparse.csr_array":
+def certificate_matrix(measurements: "sparse.csr_array", blocks: Floats) -> "sparse.bsr_array":
     """Lambda - G (3n, 3n): `blocks` (n, 3, 3) are the diagonal of Lambda, G holds the measurements."""
     from scipy import sparse
 
     n = len(blocks)
-    return sparse.bsr_array((blocks, np.arange(n), np.arange(n + 1))).tocsr() - measurements
+    diagonal = sparse.bsr_array((blocks, np.arange(n), np.arange(n + 1)))
+    return (diagonal.tocsr() - measurements).tobsr((3, 3))
 
 
 def smallest_eigenvalue(problem: Problem, rotations: Floats) -> float:
@@ -66,9 +68,9 @@ def smallest_eigenpair(problem: Problem, rotations: Floats) -> tuple[float, Floa
     certificate = certificate_matrix(measurements, multipliers(measurements, rotations))
     size = 3 * problem.n
     start = np.random.default_rng(0).standard_normal((size, 3))
-    if size <= DENSE:
-        values, vectors = smallest_eigenspace(certificate, start)
-        return float(values[0]), vectors[:, 0].reshape(-1, 3)
+    if size < LARGE:
+        found = smallest(certificate, start, 1e-6)
+        return float(found.values[0]), found.vectors[:, 0].reshape(-1, 3)
     # The row sums bound the spectrum: the smallest eigenvalue becomes the largest of the shifted matrix, and
     # Lanczos iterations resolve it on the scale of the shift, although it is near zero itself.
     shift = float(abs(certificate).sum(axis=1).max())

@@ -1,10 +1,10 @@
-"""Weighted graph Laplacian systems, solved many times on one graph."""
+"""Graph Laplacians: those whose edges carry matrices, and weighted systems solved many times on one graph."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bench.core.problem import Floats, Ints, Problem
+from bench import Floats, Ints, Problem
 
 from ..loops import edge_kernels
 from ..loops.edge_kernels import Singles
@@ -19,6 +19,23 @@ LARGE = 500  # cameras; from here on conjugate gradients are fastest where the g
 WELL_CONNECTED = 20  # edges at a camera, on average
 SMALLEST = np.finfo(np.float32).tiny  # in place of zero, under a fraction
 MOST_PRODUCTS = 500  # of conjugate gradients in one system, before it is factored instead
+
+
+def block_laplacian(problem: Problem, blocks: Floats) -> "sparse.bsr_array":
+    """Matrix (k n, k n) of the sum over the edges of |x_i - B_ij x_j|^2, for orthogonal `blocks` B_ij (m, k, k).
+
+    It has the degrees times the identity on the diagonal, -B_ij in block (i, j) and -B_ij^T in block (j, i).
+    """
+    from scipy import sparse
+
+    n, k = problem.n, blocks.shape[-1]
+    i, j = problem.edges.T
+    rows, cols = np.concatenate([i, j, np.arange(n)]), np.concatenate([j, i, np.arange(n)])
+    order = np.lexsort((cols, rows))
+    starts = np.searchsorted(rows[order], np.arange(n + 1))
+    diagonal = problem.degree[:, None, None] * np.eye(k)
+    data = np.concatenate([-blocks, -np.swapaxes(blocks, -1, -2), diagonal])[order]
+    return sparse.bsr_array((data, cols[order], starts), shape=(k * n, k * n))
 
 
 class LaplacianSolver:
@@ -92,7 +109,7 @@ def _conjugate_gradients(
 
 
 def _dots(a: Singles, b: Singles) -> Singles:
-    """Scalar product of each pair of columns."""
+    """Scalar products (4,) of the columns of a and b (n, 4)."""
     products: Singles = np.einsum("nk,nk->k", a, b)
     return products
 
@@ -110,6 +127,8 @@ def _factored(problem: Problem) -> "_DenseSystem | _SparseSystem":
 
 
 class _DenseSystem:
+    """`solve` takes weights (m,), their sums (n,) and right-hand sides (n - 1, 3), and returns x (n - 1, 3)."""
+
     def __init__(self, problem: Problem) -> None:
         self._edges = problem.edges
         self._rows = np.empty((problem.n - 1, problem.n - 1))
@@ -125,6 +144,8 @@ class _DenseSystem:
 
 
 class _SparseSystem:
+    """As `_DenseSystem`."""
+
     def __init__(self, problem: Problem) -> None:
         from scipy import sparse
 
@@ -151,7 +172,7 @@ class _SparseSystem:
         return x
 
 
-def _factor(matrix: "sparse.csc_array", ordering: str) -> "SuperLU":
+def _factor(matrix: "sparse.csc_array[np.float64]", ordering: Literal["MMD_AT_PLUS_A", "NATURAL"]) -> "SuperLU":
     from scipy.sparse.linalg import splu
 
     return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True})

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Floats
+from bench import Floats, so3
 
 
 def nearest_rotations(vectors: Floats) -> Floats:
@@ -19,8 +18,5 @@ def nearest_rotations(vectors: Floats) -> Floats:
 
 def rounded(gram: Floats) -> Floats:
     """Rotations (n, 3, 3) nearest to the three leading eigenvectors of a matrix (3n, 3n) close to R R^T."""
-    from scipy.linalg import eigh
-
-    size = len(gram)
-    values, vectors = eigh(gram, subset_by_index=[size - 3, size - 1])
-    return nearest_rotations(vectors * np.sqrt(values))
+    values, vectors = np.linalg.eigh(gram)
+    return nearest_rotations(vectors[:, -3:] * np.sqrt(values[-3:]))

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from bench.core.problem import Floats, Ints
+from bench import Floats, Ints
 
 from .edge_kernels import compiled
 

@@ -13,7 +13,7 @@ from typing import ParamSpec
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core.problem import Floats, Ints
+from bench import Floats, Ints
 
 P = ParamSpec("P")
 Singles = NDArray[np.float32]

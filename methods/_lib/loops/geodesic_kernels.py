@@ -2,7 +2,7 @@
 
 import math
 
-from bench.core.problem import Floats, Ints
+from bench import Floats, Ints
 
 from .edge_kernels import compiled
 

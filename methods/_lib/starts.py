@@ -4,20 +4,20 @@ from typing import Literal
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Floats, Problem
+from bench import Floats, Problem, so3
 
-from ... import spectral
-from ...spanning_tree import tree_rotations
-from .cemp import TRIANGLES, corruption_levels, tree_of_least_corruption
-from .triangles import sample_triangles
+from .graph.cemp import TRIANGLES, corruption_levels, tree_of_least_corruption
+from .graph.trees import tree_rotations
+from .graph.triangles import sample_triangles
+from .linear.spectral import spectral_rotations
+from .warm_up import Warm
 
 Start = Literal["spectral", "spanning-tree", "cemp-mst", "random"]
 SEEDED = ("cemp-mst", "random")  # starts that draw from the generator, so that no method is deterministic with them
 TOLERANCE = 1e-2  # radians between the eigenspace found and the true one; a start need not be better
 
 
-class Seeded:
+class Seeded(Warm):
     """A method that draws nothing but its start."""
 
     init: str
@@ -42,6 +42,22 @@ class Started(Seeded):
         return None if self.init == "random" else 1e-3
 
 
+class Refined(Started):
+    """Promises of a method that draws triangles, and refines until the mean step is below a tolerance."""
+
+    tolerance_deg: float
+
+    @property
+    def deterministic(self) -> bool:
+        """Where an edge has many triangles some are drawn."""
+        return False
+
+    @property
+    def exact_to_deg(self) -> float:
+        """From a random start only as near as the last step tells."""
+        return self.tolerance_deg if self.init == "random" else 1e-6
+
+
 def start_rotations(name: Start, problem: Problem, rng: np.random.Generator) -> Floats:
     """Rotations (n, 3, 3) to start from.
 
@@ -53,7 +69,7 @@ def start_rotations(name: Start, problem: Problem, rng: np.random.Generator) -> 
         along the tree that `CEMP` with its default parameters finds. "random": uniform on SO(3).
     """
     if name == "spectral":
-        return spectral.spectral_rotations(problem, regularisation=1.0, tolerance=TOLERANCE)[0]
+        return spectral_rotations(problem, regularisation=1.0, tolerance=TOLERANCE)[0]
     if name == "spanning-tree":
         return tree_rotations(problem, problem.weights)
     if name == "cemp-mst":

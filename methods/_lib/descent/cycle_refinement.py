@@ -4,11 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bench.core import so3
-from bench.core.problem import Estimate, Floats, Problem
+from bench import Estimate, Floats, Problem, so3
 
-from ..descent.descent import Descent
-from ..descent.iterate import SMALLEST_WEIGHT
+from .descent import Descent
+from .iterate import SMALLEST_WEIGHT
 
 LARGEST_WEIGHT = 1e8
 KEPT_AT_LEAST = 0.8  # of the edges
@@ -67,6 +66,7 @@ def refined(
 
 
 def _weights(levels: Floats, kept: float, smallest: float = SMALLEST_WEIGHT) -> Floats:
+    """Weights (m,) for `levels` (m,), of which the share `kept` that is lowest counts."""
     weights = np.maximum(levels, LARGEST_WEIGHT ** (-2 / 3)) ** -1.5
     weights[levels > np.quantile(levels, kept)] = 0
     return np.maximum(weights, smallest * weights.max())
