@@ -161,8 +161,10 @@ def _format_of(path: Path, holds: str) -> Format:
         raise InputError(f"{path}: this is {other.name} ({other.summary}), which holds no {kind.removeprefix('a ')}")
     if not beginning.data.strip() and not path.is_dir():
         raise InputError(f"{path}: the file is empty")
-    known = "; ".join(form.summary for form in able)
-    raise InputError(f"{path}: cannot tell what kind of file this is; {kind} can be read from: {known}")
+    known = ", ".join(form.name for form in able)
+    raise InputError(
+        f"{path}: cannot tell what kind of file this is; {kind} can be read from {known}, see `bench data formats`"
+    )
 
 
 def _by_hint(path: Path, forms: list[Format]) -> Format | None:

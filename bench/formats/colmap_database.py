@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.core.errors import InputError
+from bench.core.errors import InputError, described
 from bench.core.problem import Floats
 from bench.formats.format import Beginning, Format
 from bench.formats.graph import GraphFile, Ids, build, from_quaternions
@@ -39,8 +39,8 @@ def read_database(path: Path) -> GraphFile:
     try:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
             return _graph(path, database)
-    except sqlite3.Error as error:
-        raise InputError(f"{path}: cannot be read as a database of COLMAP: {error}") from error
+    except (sqlite3.Error, UnicodeError) as error:
+        raise InputError(f"{path}: cannot be read as a database of COLMAP: {described(error)}") from error
 
 
 def _graph(path: Path, database: sqlite3.Connection) -> GraphFile:

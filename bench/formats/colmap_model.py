@@ -12,7 +12,7 @@ from bench.core.errors import InputError
 from bench.core.problem import MOST_CAMERAS, Floats
 from bench.formats.format import Beginning, CameraIds, Format, RotationsFile, Solution, is_number
 from bench.formats.graph import UNIT, GraphFile, Notes, Where, first, from_quaternions
-from bench.formats.lines import Row, parse, read_bytes, rows
+from bench.formats.lines import LINE_COMMENT, Row, parse, read_bytes, rows
 
 TEXT, BINARY = "images.txt", "images.bin"
 _LAYOUT = "image_id qw qx qy qz tx ty tz camera_id name"
@@ -34,9 +34,8 @@ def read_images_text(path: Path) -> RotationsFile:
     """
     lines: list[Row] = []
     names: list[str] = []
-    for line, words in rows(path, comment="\n"):
-        is_points = len(words) % 3 == 0 and all(map(is_number, words))
-        if not is_points and not words[0].startswith("#"):
+    for line, words in rows(path, LINE_COMMENT):
+        if len(words) % 3 or not all(map(is_number, words)):  # not the line of points
             lines.append((line, words[:9]))
             names.append(" ".join(words[9:]))
     table = parse(path, lines, 1, 8, _LAYOUT)
@@ -136,7 +135,7 @@ def _writable_model(path: Path, graph: GraphFile | None) -> None:
 
 
 def _is_text(beginning: Beginning) -> bool:
-    return b"IMAGE_ID, QW" in beginning.data or any(
+    return b"image_id" in beginning.data.lower() or any(
         len(line) >= 10 and all(map(is_number, line[:9])) and not all(map(is_number, line[9:]))
         for line in beginning.lines
     )

@@ -1,5 +1,6 @@
 """What a format is: how a file of it is told from others, and what can be read from it or written to it."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,6 +16,7 @@ from bench.formats.lines import check_plain
 
 _SAMPLE = 2**16  # bytes
 _LINES = 8
+_COMMENT = re.compile(r"(?:^|(?<=\s))#")  # a name may hold a #
 
 CameraIds = NDArray[np.integer[Any]]
 
@@ -104,7 +106,7 @@ class Beginning:
         if b"\0" in self.data:
             return []
         text = self.data.decode("utf-8-sig", "replace")
-        words = (line.partition("#")[0].split() for line in text.split("\n"))
+        words = (_COMMENT.split(line, maxsplit=1)[0].split() for line in text.split("\n"))
         return [line for line, _ in zip(filter(None, words), range(_LINES), strict=False)]
 
     def has_line(self, ids: int, numbers: int) -> bool:

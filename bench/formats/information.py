@@ -52,7 +52,8 @@ def usable(precisions: Floats) -> tuple[Floats | None, tuple[str, ...]]:
     sane = (size > 0) & (size < _LARGEST)  # not NaN
     values, vectors = np.linalg.eigh(np.where(sane[:, None, None], precisions, np.eye(3)))
     wrong = ~sane | (values[:, 0] < -_POSITIVE * size)
-    wrong |= (abs(precisions - precisions.transpose(0, 2, 1)).max(axis=(1, 2)) > _POSITIVE * size) & sane
+    with np.errstate(invalid="ignore"):  # infinity less infinity
+        wrong |= (abs(precisions - precisions.transpose(0, 2, 1)).max(axis=(1, 2)) > _POSITIVE * size) & sane
     if wrong.any():
         return None, (
             f"the information of {wrong.sum()} of {m} edges is no symmetric positive matrix: information is not used",

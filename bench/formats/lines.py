@@ -14,7 +14,9 @@ from bench.core.errors import InputError, shown
 
 Row = tuple[int, list[str]]
 
-_NAN = re.compile(r"[+-]?([qs]?nan|nan[qs]?|1\.#(ind|[qs]nan))(\([\w-]*\))?0*", re.IGNORECASE)
+COMMENT = re.compile(r"(?<!\d\.)#")  # not that of 1.#QNAN
+LINE_COMMENT = re.compile(r"^\s*#")  # where a name may hold a #
+_NAN = re.compile(r"[+-]?([qs]?nan|nan[qs]?|1\.#(ind|inf|[qs]nan))(\([\w-]*\))?0*", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +75,10 @@ def decode(path: Path, data: bytes) -> str:
         ) from None
 
 
-def rows(path: Path, comment: str = "#") -> Iterator[Row]:
-    """Line number and words of each line that is not blank, without what follows `comment`."""
+def rows(path: Path, comments: re.Pattern[str] = COMMENT) -> Iterator[Row]:
+    """Line number and words of each line that is not blank, without its comment."""
     for line, text in enumerate(decode(path, read_bytes(path)).split("\n"), 1):
-        words = text.partition(comment)[0].split()
+        words = comments.split(text, maxsplit=1)[0].split()
         if words:
             yield line, words
 

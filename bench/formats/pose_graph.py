@@ -14,7 +14,7 @@ from bench.core.problem import Floats
 from bench.formats.format import Beginning, Format, Solution
 from bench.formats.graph import GraphFile, Ids, Notes, build, distinct, first, from_quaternions
 from bench.formats.information import marginal, symmetric
-from bench.formats.lines import Row, Table, decode, parse, read_bytes, rows
+from bench.formats.lines import COMMENT, Row, Table, decode, parse, read_bytes, rows
 
 _TAG = re.compile(r"[A-Z][A-Z0-9_]*(:[A-Z0-9_]+)?")
 _LOCKED = 1e-9  # cosine of the pitch below which roll and yaw cannot be told apart
@@ -200,7 +200,7 @@ def _write(path: Path, solution: Solution, graph: GraphFile | None) -> None:
     """
     assert graph is not None
     text = decode(graph.path, read_bytes(graph.path))
-    lines = [(line, line.partition("#")[0].split()) for line in text.split("\n")]
+    lines = [(line, COMMENT.split(line, maxsplit=1)[0].split()) for line in text.split("\n")]
     dialect = next(DIALECTS[words[0]] for _, words in lines if words and words[0] in DIALECTS)
     old = {int(words[1]): words for _, words in lines if words and words[0] == dialect.vertex}
     new = {int(solution.cameras[k]): solution.rotations[k].T for k in solution.solved}

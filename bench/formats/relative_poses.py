@@ -4,7 +4,7 @@ from pathlib import Path
 
 from bench.formats.format import Beginning, Format, is_number
 from bench.formats.graph import GraphFile, build, from_quaternions
-from bench.formats.lines import Row, parse, rows
+from bench.formats.lines import LINE_COMMENT, Row, parse, rows
 
 _NUMBERS = 7
 _LAYOUT = "name1 name2 qw qx qy qz tx ty tz"
@@ -21,8 +21,7 @@ def read_relative_poses(path: Path) -> GraphFile:
     InputError
         Naming the file and line.
     """
-    source = list(rows(path, comment="\n"))  # a name may hold a #
-    lines = [(line, words) for line, words in source if not words[0].startswith("#")]
+    lines = list(rows(path, LINE_COMMENT))
     names = sorted({name for _, words in lines for name in words[:2]})
     number = {name: str(k) for k, name in enumerate(names)}
     numbered: list[Row] = [(line, [*(number[name] for name in words[:2]), *words[2:]]) for line, words in lines]
