@@ -297,8 +297,8 @@ def test_matlab_has_the_transpose_and_counts_from_one(tmp_path: Path, compressed
     graph = read_graph(path)
     assert graph.cameras.tolist() == list(range(1, N + 1))
     assert worst_deg(graph) < 1e-10
-    savemat(path, {"RR": stacked[:, :, 0], "I": np.array([[1], [2]])})
-    assert read_graph(path).problem.m == 1
+    savemat(path, {"RR": stacked[:, :, 0], "I": np.array([[1], [2]], np.uint8)}, do_compression=compressed)
+    np.testing.assert_allclose(read_graph(path).problem.rotations, [relative(0, 1)], atol=1e-12)
 
 
 BAD_MATLAB = {

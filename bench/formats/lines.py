@@ -78,7 +78,7 @@ def decode(path: Path, data: bytes) -> str:
 def rows(path: Path, comments: re.Pattern[str] = COMMENT) -> Iterator[Row]:
     """Line number and words of each line that is not blank, without its comment."""
     for line, text in enumerate(decode(path, read_bytes(path)).split("\n"), 1):
-        words = comments.split(text, maxsplit=1)[0].split()
+        words = (comments.split(text, maxsplit=1)[0] if "#" in text else text).split()
         if words:
             yield line, words
 
@@ -105,7 +105,7 @@ def parse(path: Path, source: Iterable[Row], ids: int, numbers: int, layout: str
             if "_" in "".join(words):  # Python reads 1_000 as a number, no file means it so
                 raise ValueError
             integers.extend(map(int, words[:ids]))
-            floats.extend(map(_number, words[ids:]))
+            floats.extend(_numbers(words[ids:]))
         except (ValueError, OverflowError):
             raise InputError(f"{path}:{line}: {_culprit(words, ids)}; a line holds {layout}") from None
         lines.append(line)
@@ -117,6 +117,13 @@ def parse(path: Path, source: Iterable[Row], ids: int, numbers: int, layout: str
         np.array(integers, dtype=np.int64).reshape(len(lines), ids),
         np.array(floats, dtype=np.float64).reshape(len(lines), numbers),
     )
+
+
+def _numbers(words: list[str]) -> list[float]:
+    try:
+        return list(map(float, words))
+    except ValueError:
+        return list(map(_number, words))
 
 
 def _number(word: str) -> float:

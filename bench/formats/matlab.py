@@ -1,19 +1,26 @@
 """MATLAB files with ``RR`` and ``I``, as codes of rotation averaging keep them."""
 
-import warnings
+import math
+import struct
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bench.core.errors import InputError, described
+from bench.core.errors import InputError
+from bench.core.problem import Floats
 from bench.formats.format import Beginning, Format
 from bench.formats.graph import GraphFile, build
 from bench.formats.lines import read_bytes
 
-_MAGIC = b"MATLAB 5.0 MAT-file"
-_V73 = b"MATLAB 7.3 MAT-file"
+_MAGIC, _V73 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
+_HEADER = 128  # bytes; the last two say the order of bytes
+_MATRIX, _COMPRESSED = 14, 15
+_DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_COMPLEX = 0x0800
+_NUMERIC = range(6, 16)  # classes: double, single and whole numbers
+_MOST = 2**30  # bytes of a compressed array; ten million edges have less
 
 
 def read_matlab(path: Path) -> GraphFile:
@@ -27,34 +34,69 @@ def read_matlab(path: Path) -> GraphFile:
     InputError
         Naming the file and the array, and the pair (from 1) where one is at fault.
     """
-    from scipy.io import loadmat
-
     data = read_bytes(path)
     if data.startswith(_V73):
         raise InputError(f"{path}: this is a MATLAB 7.3 file; write it with save(..., '-v7')")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            content = loadmat(path, variable_names=["RR", "I"])
-    except Exception as error:  # a damaged file may fail in any of a dozen ways
-        raise InputError(f"{path}: cannot be read as a MATLAB file: {described(error)}") from error
-    pairs, matrices = _numbers(path, content, "I"), _numbers(path, content, "RR")
+        arrays = _arrays(data)
+    except (struct.error, zlib.error, ValueError, OverflowError):
+        raise InputError(f"{path}: cannot be read as a MATLAB file; write it again") from None
+    if missing := {"RR", "I"} - arrays.keys():
+        raise InputError(f"{path}: there is no array of numbers '{min(missing)}' in it; RR is 3 x 3 x m and I 2 x m")
+    pairs, matrices = arrays["I"], arrays["RR"]
     if matrices.ndim == 2:
         matrices = matrices[:, :, None]  # MATLAB drops the last axis of a single matrix
     m = matrices.shape[-1]
     if matrices.shape != (3, 3, m) or pairs.shape != (2, m) or m == 0:
         raise InputError(f"{path}: RR must be 3 x 3 x m and I 2 x m, not {matrices.shape} and {pairs.shape}")
-    whole = np.nan_to_num(pairs, nan=0.0)
-    if not ((pairs == np.round(whole)) & (whole >= 1) & (whole < 2**31)).all():
+    if not ((pairs == np.round(pairs)) & (pairs >= 1) & (pairs < 2**31)).all():
         raise InputError(f"{path}: 'I' must hold the numbers of cameras, from 1")
-    return build(pairs.T.astype(np.int64), matrices.transpose(2, 1, 0), lambda row: f"{path}: column {row + 1} of I")
+    ids = pairs.T.astype(np.int64)
+    return build(ids, matrices.transpose(2, 1, 0), lambda row: f"{path}: column {row + 1} of I")
 
 
-def _numbers(path: Path, content: dict[str, Any], name: str) -> NDArray[np.float64]:
-    array = content.get(name)
-    if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
-        raise InputError(f"{path}: there is no array of numbers '{name}' in it; RR is 3 x 3 x m and I 2 x m")
-    return array.astype(np.float64)
+def _arrays(data: bytes) -> dict[str, Floats]:
+    """The arrays RR and I, where they are there and hold real numbers.
+
+    scipy.io.loadmat reads what MATLAB writes; a damaged file may end the process.
+    """
+    order = "<" if data[_HEADER - 2 : _HEADER] == b"IM" else ">"
+    found = {}
+    for kind, content in _elements(data[_HEADER:], order):
+        if kind == _COMPRESSED:
+            kind, content = next(_elements(zlib.decompressobj().decompress(content, _MOST), order), (0, b""))
+        if kind != _MATRIX:
+            continue
+        parts = _elements(content, order)
+        flags, shape, name = (part for _, (_, part) in zip(range(3), parts, strict=False))
+        (word,) = struct.unpack_from(f"{order}I", flags)
+        if name in (b"RR", b"I") and word & 0xFF in _NUMERIC and not word & _COMPLEX:
+            storage, numbers = next(parts, (0, b""))
+            if storage not in _DTYPES:
+                raise ValueError
+            lengths = struct.unpack(f"{order}{len(shape) // 4}i", shape)
+            flat = np.frombuffer(numbers, np.dtype(order + _DTYPES[storage])).astype(np.float64)
+            if min(lengths) < 0 or math.prod(lengths) != len(flat) or len(lengths) > 3:
+                raise ValueError
+            found[name.decode()] = flat.reshape(lengths, order="F")
+    return found
+
+
+def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    """Type and content of each element: a tag of eight bytes before it, or of four where all fits into eight."""
+    place = 0
+    while place + 8 <= len(data):
+        kind, size = struct.unpack_from(f"{order}II", data, place)
+        if kind >> 16:
+            kind, size, start = kind & 0xFFFF, kind >> 16, place + 4
+            place += 8
+        else:
+            start = place + 8
+            place = start + size + (0 if kind == _COMPRESSED else -size % 8)
+        content = data[start : start + size]
+        if len(content) < size:
+            raise ValueError
+        yield kind, content
 
 
 def _recognises(beginning: Beginning) -> bool:

@@ -105,7 +105,13 @@ def read_topology(path: Path) -> tuple[int, Ints]:
     edges = _edges(path, arrays["edges"])
     cameras = _cameras(path, arrays["n"], edges)
     check_ends(edges, lambda row: f"{path}: row {row}")
-    return len(cameras), np.unique(np.sort(edges, axis=1), axis=0).astype(np.int32)
+    pairs = np.sort(edges, axis=1).astype(np.int32)
+    _, kept = np.unique(pairs, axis=0, return_index=True)
+    if (row := first(~np.isin(np.arange(len(pairs)), kept))) is not None:
+        raise InputError(
+            f"{path}: row {row}: the edge between cameras {edges[row, 0]} and {edges[row, 1]} is there already"
+        )
+    return len(cameras), pairs
 
 
 def _load(
@@ -161,8 +167,8 @@ def _precisions(path: Path, arrays: Mapping[str, NDArray[Any]], m: int) -> Float
 
 
 def _is_direction(gravity: Floats) -> NDArray[np.bool_]:
-    sane = (abs(gravity) < 1e100).all(axis=1) & (gravity != 0).any(axis=1)
-    return sane | np.isnan(gravity).all(axis=1)
+    small = np.where(abs(gravity) < 1e100, gravity, 0.0)  # squares that do not overflow
+    return (np.linalg.norm(small, axis=1) > 0) & (small == gravity).all(axis=1) | np.isnan(gravity).all(axis=1)
 
 
 def _edges(path: Path, array: NDArray[Any]) -> Ids:

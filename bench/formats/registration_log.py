@@ -86,7 +86,7 @@ def _blocks(path: Path, size: int) -> tuple[Table, Floats]:
     step = 1 + size
     heads = parse(path, lines[::step], 3, 0, f"{_HEAD}, before a matrix of {size} lines")
     body = [line for k, line in enumerate(lines) if k % step]
-    if len(body) % size:
+    if len(lines) % step:
         raise InputError(f"{path}:{lines[-1][0]}: the file ends in a matrix, which has {size} lines")
     table = parse(path, body, 0, size, f"a row of a {size} x {size} matrix")
     return heads, table.numbers.reshape(-1, size, size)
