@@ -5,10 +5,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from bench import Floats, InputError, Instance, Missing, Problem, Source, dataset
+from bench import Instance, Missing, Source, dataset
 from bench.core.errors import suggestion
+from bench.formats.chain import propagated
 from bench.formats.pose_graph import read_pose_graph
 
 from ._files.folders import revision, roots
@@ -65,29 +64,6 @@ class PoseGraph:
         names = {SPHERE, *(other.stem for folder in folders for other in folder.glob("*.g2o"))}
         where = f"put {self.graph}.g2o in {folders[0]} or name its folder with --data-dir"
         return Missing(self.graph, f"{where}{suggestion(self.graph, names)}")
-
-
-def propagated(problem: Problem) -> Floats:
-    """Rotations (n, 3, 3) of a connected, noise-free graph, chained along a breadth-first tree.
-
-    Raises
-    ------
-    InputError
-        Where the graph is not connected.
-    """
-    from scipy.sparse.csgraph import breadth_first_order
-
-    if problem.components.any():
-        raise InputError("rotations cannot be propagated over a graph that is not connected")
-    order, parent = breadth_first_order(problem.adjacency(), 0, directed=False)
-    measured = {(int(i), int(j)): r for (i, j), r in zip(problem.edges, problem.rotations, strict=True)}
-    rotations = np.empty((problem.n, 3, 3))
-    rotations[0] = np.eye(3)
-    for camera in order[1:].tolist():
-        from_ = int(parent[camera])
-        step = measured[camera, from_] if camera < from_ else measured[from_, camera].T
-        rotations[camera] = step @ rotations[from_]
-    return rotations
 
 
 def _gtsam_data() -> Path:

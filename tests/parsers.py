@@ -12,6 +12,20 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from format_seeds import (
+    FLAT,
+    IMAGES,
+    IMAGES_BINARY,
+    INFO,
+    LOG,
+    MATRICES,
+    OPEN3D,
+    RELATIVE,
+    SWITCHABLE,
+    TEXT,
+    database,
+    matlab,
+)
 from scenes import UNREGISTERED, bundle_camera, egs_line, write_scene
 
 from bench.core import so3
@@ -20,7 +34,7 @@ from bench.core.problem import Instance, Problem
 from bench.datasets._files.archive import damaged
 from bench.datasets._files.download import Archive
 from bench.execution.output import UnusableError, read_output
-from bench.formats import read_graph, toml_file
+from bench.formats import read_graph, read_rotations, toml_file
 from bench.formats.npz import read_topology
 from bench.formats.one_dsfm import read_bundle
 from bench.papers.layout import load_layout
@@ -219,6 +233,12 @@ FACTS = {"name": "toy", "protocol": "all", "source": "", "revision": "1", "notes
 GRAPH = {"edges": EDGES, "rotations": MEASURED}
 
 
+def _log_with_information(data: bytes, folder: Path) -> object:
+    (folder / "graph.log").write_text(LOG)
+    (folder / "graph.info").write_bytes(data)
+    return read_graph(folder / "graph.log")
+
+
 def _project_file(package: str, name: str) -> bytes:
     from importlib import resources
 
@@ -243,10 +263,31 @@ PARSERS: dict[str, Parser] = {
     "bundle-header": Parser((b"# Bundle file v0.3\n5 1\n" + b"0 0 0\n" * 25,), _scene_file("gt_bundle.out")),
     "g2o": Parser((G2O.encode(), TORO.encode()), _file("graph.g2o", read_graph)),
     "gtsam": Parser((TORO.encode(), b"EDGE3 5 7 0 0 0 0.1 0.2 0.3\n"), _file("graph.txt", read_graph)),
+    "planar": Parser((FLAT.encode(), SWITCHABLE.encode()), _file("graph.txt", read_graph)),
+    "relative-poses": Parser((RELATIVE.encode(),), _file("relpose.txt", read_graph)),
+    "log": Parser((LOG.encode(),), _file("result.log", lambda path: (read_graph(path), read_rotations(path)))),
+    "information": Parser((INFO.encode(),), _log_with_information),
+    "open3d": Parser((OPEN3D.encode(),), _file("graph.json", read_graph)),
+    "matlab": Parser(matlab(), _file("graph.mat", read_graph)),
+    "database": Parser((database(),), _file("database.db", read_graph)),
+    "images": Parser((IMAGES.encode(),), _file("images.txt", read_rotations)),
+    "images-binary": Parser((IMAGES_BINARY,), _file("images.bin", read_rotations)),
+    "rotations": Parser((TEXT.encode(), TEXT.replace(" ", ",").encode()), _file("out.csv", read_rotations)),
+    "trajectory": Parser(
+        (b"# time\n0.5 1 2 3 0 0 0 1\n1 1 2 3 0.5 0.5 0.5 0.5\n", b"1 0 0 4 0 1 0 5 0 0 1 6\n" * 3),
+        _file("poses.txt", read_rotations),
+    ),
+    "truth-bundle": Parser((BUNDLE.encode(),), _file("truth.out", read_rotations)),
+    "truth-npz": Parser(
+        (_npz(cameras=np.arange(N), rotations=TRUTH, names=np.array(list("abcd"))), _npz(truth=TRUTH)),
+        _file("truth.npz", read_rotations),
+        "npz",
+    ),
     "npz": Parser(
         (
-            _npz(**GRAPH, weights=np.ones(5), n=4),
+            _npz(**GRAPH, weights=np.ones(5), weights_kind="count", n=4),
             _npz_compressed(**GRAPH),
+            _npz(**GRAPH, covariances=MATRICES, gravity=np.ones((N, 3)), names=np.array(list("abcd"))),
         ),
         _file("graph.npz", read_graph),
         "npz",

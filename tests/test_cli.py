@@ -134,7 +134,6 @@ def test_dry_run_writes_nothing(tmp_path: Path) -> None:
         (("run", "--data-dir", "nowhere"), "nowhere"),
         (("table", "nowhere"), "nowhere is not the folder of a run"),
         (("solve", "nowhere.g2o", "-m", "spectral", "-o", "x.npz"), "nowhere.g2o: there is no such file"),
-        (("solve", "nowhere.g2o", "-m", "spectral", "-o", "x.docx"), "x.docx"),
         (("check", "method", "spectral", "--plugin", "nowhere.py"), "there is no such Python file"),
         (("new", "method", "My Method"), "is not a name for a method"),
     ],
@@ -153,7 +152,6 @@ def test_bad_input_is_one_sentence_and_exit_code_2(tmp_path: Path, arguments: tu
         ("0 1 1 0 0 0 1 0 0 0 nan 0 0 0\n", "EGs.txt:1: the rotation holds NaN"),
         ("0 1 1 0 0 0 1 0 0 0 -1 0 0 0\n", "EGs.txt:1: the matrix is a reflection"),
         ("0 0 1 0 0 0 1 0 0 0 1 0 0 0\n", "EGs.txt:1: an edge from camera 0 to itself"),
-        ("0 1 1 0 0 0 1 0 0 0 1 0 0 0\n1 0 1 0 0 0 1 0 0 0 1 0 0 0\n", "EGs.txt:2: the edge between cameras"),
         ("0 x 1 0 0 0 1 0 0 0 1 0 0 0\n", "EGs.txt:1: 'x' is not a camera id"),
     ],
 )

@@ -68,8 +68,6 @@ BAD_EGS = {
     "scaled": (with_line("11 12 0.9 0 0 0 0.9 0 0 0 0.9 0 0 0"), "not a rotation: the nearest one is"),
     "large entry": (with_line("11 12 1e200 0 0 0 1 0 0 0 1 0 0 0"), "an entry of size 1e+200"),
     "self edge": (with_line(f"11 11 {IDENTITY}"), "from camera 11 to itself"),
-    "duplicate": (with_line(f"10 12 {IDENTITY}"), "EGs.txt:2; keep one"),
-    "duplicate, reversed": (with_line(f"12 10 {IDENTITY}"), "is there already"),
     "binary": (with_line("\x00\x01\x02"), "1 values where there must be 14"),
 }
 
@@ -105,7 +103,7 @@ def test_paths_that_are_no_graphs(tmp_path: Path) -> None:
     (tmp_path / "EGs.txt").write_text(" \n\n")
     assert refusal(tmp_path) == f"{tmp_path / 'EGs.txt'}: the file is empty"
     (tmp_path / "graph.docx").write_text("x")
-    assert "cannot tell what kind of graph" in refusal(tmp_path / "graph.docx")
+    assert "cannot tell what kind of file" in refusal(tmp_path / "graph.docx")
 
 
 # --- a folder ----------------------------------------------------------------------------------------
@@ -215,7 +213,7 @@ def test_g2o_is_converted_to_world_to_camera(tmp_path: Path, information: bool) 
     graph = read_graph(path)
     assert graph.problem.n == 5
     assert graph.problem.residuals(np.swapaxes(poses, 1, 2)).max() < 1e-9
-    assert graph.notes == ("1 FIX lines hold no relative pose: left out",)
+    assert graph.notes == ("1 FIX lines are left out",)
 
 
 def test_toro_angles_are_roll_pitch_yaw(tmp_path: Path) -> None:
@@ -235,11 +233,12 @@ BAD_G2O = {
     f"EDGE_SE3:QUAT 0 1 {QUAT}\nEDGE_SE3:QUAT 1 2 0 0 0 0 0 0 0\n": ":2: the quaternion does not have norm 1",
     f"EDGE_SE3:QUAT 0 1 {QUAT}\nEDGE_SE3:QUAT 1 2 0 0 0 nan 0 0 1\n": ":2: the quaternion",
     f"EDGE_SE3:QUAT 0 1 {QUAT}\nEDGE_SE3:QUAT 1 2 0 0 0 1e300 0 0 1\n": ":2: the quaternion",
-    f"EDGE_SE3:QUAT 0 1 {QUAT}\nEDGE_SE3:QUAT 1 0 {QUAT}\n": ":2: the edge between cameras 1 and 0",
     f"VERTEX_SE3:QUAT 0 {QUAT}\nEDGE_SE3:QUAT 0 1 {QUAT}\n": ":2: camera 1 has no VERTEX_SE3:QUAT line",
     f"VERTEX_SE3:QUAT 0 {QUAT}\nVERTEX_SE3:QUAT 0 {QUAT}\nEDGE_SE3:QUAT 0 1 {QUAT}\n": ":2: camera 0 is",
     f"EDGE_SE3:QUAT 0 1 {QUAT}\nEDGE_SE3:QUATT 1 2 {QUAT}\n": ":2: 'EDGE_SE3:QUATT' does not begin a line",
-    "VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 0 0 0\n": ":1: VERTEX_SE2 belongs to a graph in the plane",
+    f"EDGE_SE3:QUAT 0 1 {QUAT}\nEDGE_SE2 0 1 0 0 0\n": ":2: 'EDGE_SE2' does not begin a line",
+    "VERTEX_SE2 0 0 0 0\nFIX 0\n": ": there is no EDGE_SE2 line",
+    "EDGE_SE2 0 1 0 0 -90\n": ":1: an angle is not within a full turn",
     f"VERTEX_SE3:QUAT 0 {QUAT}\n": ": there is no EDGE_SE3:QUAT line",
     "EDGE3 0 1 0 0 0 180 0 0\n": ":1: an angle is not within a full turn",
     "": ": the file is empty",
@@ -303,10 +302,11 @@ BAD_NPZ = {
         "rotations": ROTATIONS * np.array([1, 1, np.nan])[:, None, None],
     },
     "row 0: the matrix is a reflection": {"edges": EDGES, "rotations": -ROTATIONS},
-    "row 2: the edge between cameras 1 and 2 is there already": {
-        "edges": [[0, 1], [2, 1], [1, 2]],
-        "rotations": ROTATIONS,
-    },
+    "'precisions' must have shape (3, 3, 3)": {"edges": EDGES, "rotations": ROTATIONS, "precisions": np.eye(3)},
+    "row 1: 'gravity' is [0.0, 0.0, 0.0]": {"edges": EDGES, "rotations": ROTATIONS, "gravity": np.diag([1, 0, 1])},
+    "'weights_kind' is ('votes',)": {"edges": EDGES, "rotations": ROTATIONS, "weights_kind": "votes"},
+    "'names' has 2 entries, but there are 3": {"edges": EDGES, "rotations": ROTATIONS, "names": ["a", "b"]},
+    "'names' holds int64; it must hold text": {"edges": EDGES, "rotations": ROTATIONS, "names": [1, 2, 3]},
     "plain arrays": {"edges": EDGES, "rotations": np.array([None] * 3)},
 }
 
@@ -368,7 +368,7 @@ def test_rotations_are_written_with_all_digits(tmp_path: Path, suffix: str) -> N
     rotations[1] = np.nan
     path = tmp_path / f"out{suffix}"
     path.write_text("an older file")
-    rotations_writer(path)(cameras, rotations)
+    rotations_writer(path)(cameras, rotations, {})
     if suffix == ".npz":
         with np.load(path) as archive:
             read_ids, read = archive["cameras"].tolist(), archive["rotations"]
@@ -382,7 +382,7 @@ def test_rotations_are_written_with_all_digits(tmp_path: Path, suffix: str) -> N
 
 
 def test_a_bad_output_path_is_refused_before_solving(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"written as \.npz, \.txt or \.csv"):
+    with pytest.raises(InputError, match=r"written as .*\.npz.*\.txt, \.csv or a folder"):
         rotations_writer(tmp_path / "out.mat")
     with pytest.raises(InputError, match="there is no folder"):
         rotations_writer(tmp_path / "none" / "out.npz")
@@ -391,7 +391,7 @@ def test_a_bad_output_path_is_refused_before_solving(tmp_path: Path) -> None:
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "out.txt"
     path.write_text("an older file")
-    with pytest.raises(ValueError, match="zip"):
-        rotations_writer(path)(np.arange(3), np.zeros((2, 3, 3)))
+    with pytest.raises(ValueError, match=r"zip\(\)"):
+        rotations_writer(path)(np.arange(3), np.zeros((2, 3, 3)), {})
     assert path.read_text() == "an older file"
     assert [p.name for p in tmp_path.iterdir()] == [path.name]

@@ -27,7 +27,6 @@ def ring(n: int = 5) -> tuple[Problem, np.ndarray]:
         (2, [[-1, 1]], [EYE], r"camera ids go from 0 to 1"),
         (2, [[1, 1]], [EYE], "a camera with itself"),
         (2, [[1, 0]], [EYE], "edges must have i < j"),
-        (3, [[0, 1], [1, 2], [0, 1]], [EYE] * 3, r"edge 2 is \(0, 1\), which is there already"),
         (2, [[0, 1]], [EYE, EYE], r"rotations must have shape \(1, 3, 3\)"),
         (2, [[0, 1]], [np.nan * EYE], r"the rotation of edge 0 \(0, 1\) is not finite"),
         (2, [[0, 1]], [-EYE], r"has determinant -1, but a rotation has \+1"),

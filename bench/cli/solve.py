@@ -24,9 +24,9 @@ def solve(
     from bench.formats import read_graph, rotations_writer
     from bench.plugins.catalog import catalog
 
-    write = rotations_writer(out)
     chosen = catalog("method", plugin or []).one(method)
     loaded = read_graph(graph)
+    write = rotations_writer(out, loaded)
     problem = loaded.problem
     typer.echo(f"{graph}: {problem.n} cameras, {problem.m} edges")
     with SingleSolver(*chosen, Limits(timeout, memory), threads) as solver:
@@ -36,8 +36,11 @@ def solve(
     if estimate is None:
         typer.echo(f"{method}: {ended.text}", err=True)
         raise typer.Exit(1)
-    write(loaded.cameras, estimate.rotations)
     residuals = problem.residuals(estimate.rotations)
+    said = {"edges": loaded.cameras[problem.edges], "residuals": residuals, "stop_reason": estimate.stop_reason}
+    if estimate.edge_weights is not None:
+        said["edge_weights"] = estimate.edge_weights
+    write(loaded.cameras, estimate.rotations, said)
     typer.echo(_summary(method, report["solve_s"], residuals))
     typer.echo(f"wrote {out}")
 

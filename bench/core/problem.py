@@ -3,27 +3,36 @@
 The convention, everywhere: R_ij = R_i R_j^T for every measured edge (i, j), where R_i maps world to camera.
 """
 
-import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.core import so3
-from bench.core.errors import InputError
+from bench.core.checks import (
+    MOST_CAMERAS,
+    ROTATION_TOLERANCE,
+    Floats,
+    Ints,
+    checked_edges,
+    checked_gravity,
+    checked_precisions,
+    checked_rotations,
+    checked_weights,
+)
+from bench.core.errors import InputError, shown
 
 if TYPE_CHECKING:
     from scipy import sparse
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
+__all__ = ["MOST_CAMERAS", "ROTATION_TOLERANCE", "Floats", "Ints"]  # beside what is defined here
 
-ROTATION_TOLERANCE = 1e-6
-_LARGEST = 1e6  # the entries of a rotation are at most 1; larger ones still may not overflow a determinant
-MOST_CAMERAS = 10_000_000  # so that a damaged number does not take all memory
+WeightsKind = Literal["count", "precision"]
+Information = Literal["weights", "precisions", "gravity"]
+INFORMATION: tuple[Information, ...] = ("weights", "precisions", "gravity")  # what may come with the measurements
 
 
 class Skipped(Exception):  # noqa: N818 - an outcome, not an error
@@ -39,32 +48,48 @@ class Problem:
     n
         Number of cameras.
     edges
-        (m, 2), i < j, no pair twice.
+        (m, 2), i < j. A pair may be measured several times: parallel edges.
     rotations
         (m, 3, 3), R_ij = R_i R_j^T. Matrices that are further than 1e-6 (Frobenius) from SO(3) are replaced by the
         nearest rotation, with one warning that counts them.
     weights
-        (m,) positive, such as match counts, or None.
+        (m,) positive: how far each measurement is to be trusted, relative to the others; or None.
+    weights_kind
+        What they are: "count", such as matches, or "precision", inverse squares of the noise's scale.
+    precisions
+        (m, 3, 3) inverse covariances, in rad^-2 up to one scale, of d in R_ij = exp(d) R_i R_j^T, in frame i; or None.
+    gravity
+        (n, 3) direction of gravity in the axes of each camera, made unit vectors; NaN where unknown; or None.
 
     All arrays are copied to contiguous memory and made read-only.
 
     Raises
     ------
     InputError
-        On shapes that do not fit, ids outside the graph, self edges, reversed or duplicate edges, values
-        that are not finite, reflections (determinant below zero), or an empty graph.
+        On shapes that do not fit, ids outside the graph, self edges, reversed edges, values that are not finite,
+        reflections (determinant below zero), or an empty graph.
     """
 
     n: int
     edges: Ints
     rotations: Floats
     weights: Floats | None = None
+    weights_kind: WeightsKind = "precision"
+    precisions: Floats | None = None
+    gravity: Floats | None = None
 
     def __post_init__(self) -> None:
-        edges = _checked_edges(self.n, self.edges)
-        rotations = _checked_rotations(edges, self.rotations)
-        weights = None if self.weights is None else _checked_weights(edges, self.weights)
-        for name, value in (("edges", edges), ("rotations", rotations), ("weights", weights)):
+        edges = checked_edges(self.n, self.edges)
+        checked: dict[str, Floats | Ints | None] = {
+            "edges": edges,
+            "rotations": checked_rotations(edges, self.rotations),
+            "weights": None if self.weights is None else checked_weights(edges, self.weights),
+            "precisions": None if self.precisions is None else checked_precisions(edges, self.precisions),
+            "gravity": None if self.gravity is None else checked_gravity(self.n, self.gravity),
+        }
+        if self.weights_kind not in get_args(WeightsKind):
+            raise InputError(f"weights_kind is {shown(self.weights_kind)}; it must be 'count' or 'precision'")
+        for name, value in checked.items():
             if value is not None:
                 value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -148,9 +173,34 @@ class Problem:
         label = np.full(self.n, -1, dtype=np.int32)
         label[cameras] = np.arange(len(cameras), dtype=np.int32)
         kept: NDArray[np.bool_] = np.all(label[self.edges] >= 0, axis=1)
-        edges, rotations = oriented(label[self.edges[kept]], self.rotations[kept])
+        precisions = None if self.precisions is None else self.precisions[kept]
+        edges, rotations, precisions = reoriented(label[self.edges[kept]], self.rotations[kept], precisions)
         weights = None if self.weights is None else self.weights[kept]
-        return Problem(len(cameras), edges, rotations, weights), kept
+        gravity = None if self.gravity is None else self.gravity[cameras]
+        kind = self.weights_kind
+        return Problem(len(cameras), edges, rotations, weights, kind, precisions, gravity), kept
+
+    @property
+    def carries(self) -> frozenset[Information]:
+        """What came with the measurements."""
+        return frozenset(name for name in INFORMATION if getattr(self, name) is not None)
+
+    def keeping(self, names: Collection[Information]) -> "Problem":
+        """The problem with none of what came with the measurements but this."""
+        absent: dict[str, Any] = dict.fromkeys(self.carries - set(names))
+        return replace(self, **absent) if absent else self
+
+    @cached_property
+    def relative_weights(self) -> Floats:
+        """(m,) weights with mean one; ones where there are none."""
+        weights = np.ones(self.m) if self.weights is None else self.weights / self.weights.mean()
+        weights.setflags(write=False)
+        return weights
+
+    @cached_property
+    def has_parallel_edges(self) -> bool:
+        """Whether a pair is measured more than once."""
+        return len(np.unique(self.edges[:, 0].astype(np.int64) * self.n + self.edges[:, 1])) < self.m
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,90 +300,22 @@ class Estimate:
 
 def oriented(edges: NDArray[np.integer[Any]], rotations: Floats) -> tuple[Ints, Floats]:
     """Edges (m, 2) with i < j, and their rotations (m, 3, 3): transposed where an edge had to be reversed."""
+    edges, rotations, _ = reoriented(edges, rotations, None)
+    return edges, rotations
+
+
+def reoriented(
+    edges: NDArray[np.integer[Any]], rotations: Floats, precisions: Floats | None
+) -> tuple[Ints, Floats, Floats | None]:
+    """`oriented`, with the precisions (m, 3, 3): R_ij = exp(d) R_i R_j^T gives R_ji = exp(-R_ji d) R_j R_i^T."""
     reverse = edges[:, 0] > edges[:, 1]
     flipped = np.where(reverse[:, None], edges[:, ::-1], edges).astype(np.int32)
-    return flipped, np.where(reverse[:, None, None], np.swapaxes(rotations, -1, -2), rotations)
+    transposed = np.swapaxes(rotations, -1, -2)
+    if precisions is not None:
+        precisions = np.where(reverse[:, None, None], transposed @ precisions @ rotations, precisions)
+    return flipped, np.where(reverse[:, None, None], transposed, rotations), precisions
 
 
 def _frozen(array: Ints) -> Ints:
     array.setflags(write=False)
     return array
-
-
-def _checked_edges(n: int, edges: Any) -> Ints:
-    if n < 1:
-        raise InputError("the graph has no cameras")
-    if n > MOST_CAMERAS:
-        raise InputError(f"the graph claims {n} cameras, and at most {MOST_CAMERAS} can be handled")
-    given = np.asarray(edges)
-    if given.ndim != 2 or given.shape[1] != 2:
-        raise InputError(f"edges must have shape (m, 2), not {given.shape}")
-    if len(given) == 0:
-        raise InputError("the graph has no edges")
-    if given.dtype.kind not in "iu":
-        raise InputError(f"edges must be whole numbers, not {given.dtype}")
-    if (bad := (given < 0) | (given >= n)).any():
-        row = int(np.flatnonzero(bad.any(axis=1))[0])
-        raise InputError(f"edge {row} is {_pair(given[row])}, but camera ids go from 0 to {n - 1}")
-    out = np.array(given, dtype=np.int32, order="C")
-    if (bad := out[:, 0] == out[:, 1]).any():
-        row = int(np.flatnonzero(bad)[0])
-        raise InputError(f"edge {row} is {_pair(out[row])}: a camera with itself")
-    if (bad := out[:, 0] > out[:, 1]).any():
-        row = int(np.flatnonzero(bad)[0])
-        raise InputError(f"edge {row} is {_pair(out[row])}: edges must have i < j")
-    key = out[:, 0].astype(np.int64) * n + out[:, 1]
-    order = np.argsort(key, kind="stable")
-    if (bad := np.diff(key[order]) == 0).any():
-        row = int(order[np.flatnonzero(bad)[0] + 1])
-        raise InputError(f"edge {row} is {_pair(out[row])}, which is there already")
-    return out
-
-
-def _checked_rotations(edges: Ints, rotations: Any) -> Floats:
-    given = np.asarray(rotations)
-    if given.dtype.kind not in "iuf":
-        raise InputError(f"rotations must be numbers, not {given.dtype}")
-    if given.shape != (len(edges), 3, 3):
-        raise InputError(f"rotations must have shape ({len(edges)}, 3, 3), not {given.shape}")
-    out = np.array(given, dtype=np.float64, order="C")
-    if (bad := ~np.isfinite(out).all(axis=(1, 2))).any():
-        row = int(np.flatnonzero(bad)[0])
-        raise InputError(f"the rotation of edge {row} {_pair(edges[row])} is not finite")
-    if (bad := (abs(out) > _LARGEST).any(axis=(1, 2))).any():
-        row = int(np.flatnonzero(bad)[0])
-        raise InputError(
-            f"the rotation of edge {row} {_pair(edges[row])} has an entry of size {abs(out[row]).max():.3g}"
-        )
-    if (bad := np.linalg.det(out) <= 0).any():
-        row = int(np.flatnonzero(bad)[0])
-        raise InputError(
-            f"the rotation of edge {row} {_pair(edges[row])} has determinant {np.linalg.det(out[row]):.3g}, "
-            "but a rotation has +1"
-        )
-    off = np.linalg.norm(out @ np.swapaxes(out, -1, -2) - np.eye(3), axis=(1, 2)) > ROTATION_TOLERANCE
-    if off.any():
-        warnings.warn(
-            f"{off.sum()} of {len(out)} relative rotations were not in SO(3) to {ROTATION_TOLERANCE:g} "
-            "and were replaced by the nearest rotation",
-            stacklevel=4,
-        )
-        out[off] = so3.project(out[off])
-    return out
-
-
-def _checked_weights(edges: Ints, weights: Any) -> Floats:
-    given = np.asarray(weights)
-    if given.dtype.kind not in "iuf":
-        raise InputError(f"weights must be numbers, not {given.dtype}")
-    if given.shape != (len(edges),):
-        raise InputError(f"weights must have shape ({len(edges)},), not {given.shape}")
-    out = np.array(given, dtype=np.float64, order="C")
-    if (bad := ~(np.isfinite(out) & (out > 0))).any():
-        row = int(np.flatnonzero(bad)[0])
-        raise InputError(f"the weight of edge {row} {_pair(edges[row])} is {out[row]:g}, not a positive number")
-    return out
-
-
-def _pair(edge: Ints) -> str:
-    return f"({edge[0]}, {edge[1]})"

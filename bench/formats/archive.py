@@ -25,7 +25,7 @@ class _UnreadableError(Exception):
     """Why an array cannot be read, to be completed by the name of the file."""
 
 
-def load(path: Path, wanted: Collection[str]) -> dict[str, NDArray[Any]]:
+def load(path: Path, wanted: Collection[str], texts: Collection[str] = ()) -> dict[str, NDArray[Any]]:
     """Read arrays of numbers from a ``.npz``.
 
     Parameters
@@ -34,6 +34,8 @@ def load(path: Path, wanted: Collection[str]) -> dict[str, NDArray[Any]]:
         The archive.
     wanted
         Names of arrays; those that are not in it are left out, and others in it are not looked at.
+    texts
+        Which of them hold text (dtype U) instead.
 
     Raises
     ------
@@ -45,7 +47,7 @@ def load(path: Path, wanted: Collection[str]) -> dict[str, NDArray[Any]]:
         raise InputError(f"{path}: there is no such file")
     try:
         with zipfile.ZipFile(path) as archive:
-            return _arrays(archive, wanted, max(_ALWAYS_FINE, _MOST_RATIO * path.stat().st_size))
+            return _arrays(archive, wanted, texts, max(_ALWAYS_FINE, _MOST_RATIO * path.stat().st_size))
     except _UnreadableError as error:
         raise InputError(f"{path}: {error}") from None
     except Exception as error:  # a damaged zip or header may fail in any of a dozen ways
@@ -54,20 +56,23 @@ def load(path: Path, wanted: Collection[str]) -> dict[str, NDArray[Any]]:
         ) from error
 
 
-def _arrays(archive: zipfile.ZipFile, wanted: Collection[str], most: int) -> dict[str, NDArray[Any]]:
+def _arrays(
+    archive: zipfile.ZipFile, wanted: Collection[str], texts: Collection[str], most: int
+) -> dict[str, NDArray[Any]]:
     named = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
     members = {name: info for name, info in named.items() if name in wanted}
     total = sum(info.file_size for info in members.values())
     if total > most:
         raise _UnreadableError(f"its arrays claim {total} bytes, far more than such a file can hold; write it again")
-    return {name: _array(archive, name, info) for name, info in members.items()}
+    return {name: _array(archive, name, info, name in texts) for name, info in members.items()}
 
 
-def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo) -> NDArray[Any]:
+def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo, is_text: bool) -> NDArray[Any]:
     with archive.open(info) as file:
         shape, fortran, dtype = _header(file)
-        if dtype.kind not in _NUMBERS or dtype.subdtype is not None:
-            raise _UnreadableError(f"'{name}' holds {dtype.name}; a file of plain arrays holds numbers")
+        if dtype.kind not in ("U" if is_text else _NUMBERS) or dtype.subdtype is not None:
+            rule = "it must hold text" if is_text else "a file of plain arrays holds numbers"
+            raise _UnreadableError(f"'{name}' holds {dtype.name}; {rule}")
         size = math.prod(shape) * dtype.itemsize
         if min(shape, default=0) < 0 or size != info.file_size - file.tell():
             raise _UnreadableError(

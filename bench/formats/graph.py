@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,14 +10,18 @@ from numpy.typing import NDArray
 
 from bench.core import so3
 from bench.core.errors import InputError
-from bench.core.problem import Floats, Problem, oriented
+from bench.core.problem import Floats, Problem, WeightsKind, reoriented
+from bench.formats.information import usable
 from bench.formats.lines import Table
 
 Ids = NDArray[np.int64]
 Where = Callable[[int], str]
+Notes = tuple[str, ...]
 
-# Frobenius. The six digits of EGs.txt leave 2e-6, and a file with two digits still passes.
-PRECISION = 1e-2
+# Frobenius. Two digits, rounded or cut off, leave 3e-2 at most; the six of EGs.txt leave 2e-6.
+PRECISION = 3e-2
+UNIT = 0.1  # how far the norm of a quaternion may be from 1
+_NOTED = 1e-2  # from where on that is worth a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,16 +31,25 @@ class GraphFile:
     Parameters
     ----------
     problem
-        The graph, its cameras numbered from 0.
+        The graph, its cameras numbered from 0, with what the file says of the trust in each measurement.
     cameras
         (n,) the id that the file gives to each camera, ascending.
     notes
         What was left out or must be known of it.
+    names
+        (n,) what the file calls the cameras, such as images; None where they only have ids.
+    path
+        The file.
+    format
+        Name of its format; see `known_formats`.
     """
 
     problem: Problem
     cameras: Ids
-    notes: tuple[str, ...] = ()
+    notes: Notes = ()
+    names: tuple[str, ...] | None = None
+    path: Path = Path()
+    format: str = ""
 
 
 def build(
@@ -45,53 +59,54 @@ def build(
     *,
     cameras: Ids | None = None,
     weights: Floats | None = None,
-    notes: tuple[str, ...] = (),
+    weights_kind: WeightsKind = "count",
+    precisions: Floats | None = None,
+    gravity: Floats | None = None,
+    names: tuple[str, ...] | None = None,
+    notes: Notes = (),
 ) -> GraphFile:
     """Check the edges of a file and number its cameras from 0.
 
     Parameters
     ----------
     ids
-        (m, 2) ends of each edge, as the file names them, in any order.
+        (m, 2) ends of each edge, as the file names them, in any order; a pair may be there several times.
     matrices
         (m, 3, 3) R_ij = R_i R_j^T to the precision of the file; the nearest rotation is taken.
     where
         The place of a row in the file, such as ``EGs.txt:7``.
     cameras
         (n,) every id of the graph, ascending; both ends of every edge are among them. By default, only those.
-    weights
-        (m,) positive, or None.
+    weights, weights_kind, gravity
+        As in `Problem`.
+    precisions
+        (m, 3, 3) in frame i, the first of each row of `ids`. Left out, with a note, where one of them is no positive
+        matrix, and without one where all are the same multiple of the identity, which says nothing.
+    names
+        (n,) of the cameras.
 
     Raises
     ------
     InputError
-        On an edge from a camera to itself, a pair that is there twice (in either order), or a matrix that is
-        not a rotation.
+        On an edge from a camera to itself, or a matrix that is not a rotation.
     """
-    check_pairs(ids, where)
+    check_ends(ids, where)
     rotations = checked_rotations(matrices, where)
     cameras = np.unique(ids) if cameras is None else cameras
-    edges, rotations = oriented(np.searchsorted(cameras, ids), rotations)
-    return GraphFile(Problem(len(cameras), edges, rotations, weights), cameras, notes)
+    if precisions is not None:
+        precisions, doubts = usable(precisions)
+        notes = (*notes, *doubts)
+    edges, rotations, precisions = reoriented(np.searchsorted(cameras, ids), rotations, precisions)
+    problem = Problem(len(cameras), edges, rotations, weights, weights_kind, precisions, gravity)
+    return GraphFile(problem, cameras, notes, names)
 
 
-def check_pairs(ids: Ids, where: Where) -> None:
-    """Refuse negative ids, self edges, and pairs that are there twice in either order."""
+def check_ends(ids: Ids, where: Where) -> None:
+    """Refuse negative ids and self edges."""
     if (row := first((ids < 0).any(axis=1))) is not None:
         raise InputError(f"{where(row)}: {ids[row].min()} is not a camera id; ids start at 0")
     if (row := first(ids[:, 0] == ids[:, 1])) is not None:
         raise InputError(f"{where(row)}: an edge from camera {ids[row, 0]} to itself; remove it")
-    ends = np.sort(ids, axis=1)
-    order = np.lexsort((ends[:, 1], ends[:, 0]))
-    repeated = (np.diff(ends[order], axis=0) == 0).all(axis=1)
-    if repeated.any():
-        later = order[1:][repeated]
-        row = int(later.min())
-        earlier = int(order[int(np.flatnonzero(order == row)[0]) - 1])
-        raise InputError(
-            f"{where(row)}: the edge between cameras {ids[row, 0]} and {ids[row, 1]} is there already, "
-            f"at {where(earlier)}; keep one of them"
-        )
 
 
 def checked_rotations(matrices: Floats, where: Where) -> Floats:
@@ -115,6 +130,23 @@ def checked_rotations(matrices: Floats, where: Where) -> Floats:
         )
         raise InputError(f"{where(row)}: {what}; correct or remove it")
     return rotations
+
+
+def from_quaternions(q: Floats, where: Where) -> tuple[Floats, Notes]:
+    """Rotations (k, 3, 3) of quaternions (k, 4), scalar first, and a note where some had to be normalised.
+
+    Raises
+    ------
+    InputError
+        Where the norm is further than `UNIT` from 1.
+    """
+    sane = (abs(q) <= 1 + UNIT).all(axis=1, keepdims=True)  # not NaN, and squares that do not overflow
+    off = abs(np.linalg.norm(np.where(sane, q, 0.0), axis=1) - 1)
+    if (row := first(off > UNIT)) is not None:
+        raise InputError(f"{where(row)}: the quaternion does not have norm 1; correct or remove it")
+    count = int((off > _NOTED).sum())
+    note = f"{count} of {len(q)} quaternions are up to {100 * off.max(initial=0):.1f} % off norm 1: normalised"
+    return so3.from_quaternion(q), (note,) if count else ()
 
 
 def distinct(table: Table) -> Ids:

@@ -1,5 +1,7 @@
 """Tables of numbers in text files; whatever cannot be read is named with its file and line."""
 
+import math
+import re
 from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -11,6 +13,10 @@ from numpy.typing import NDArray
 from bench.core.errors import InputError, shown
 
 Row = tuple[int, list[str]]
+
+COMMENT = re.compile(r"(?<!\d\.)#")  # not that of 1.#QNAN
+LINE_COMMENT = re.compile(r"^\s*#")  # where a name may hold a #
+_NAN = re.compile(r"[+-]?([qs]?nan|nan[qs]?|1\.#(ind|inf|[qs]nan))(\([\w-]*\))?0*", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +64,10 @@ def check_plain(path: Path) -> None:
 
 
 def decode(path: Path, data: bytes) -> str:
-    """Text of bytes that must be ASCII; `InputError` names the line of the first byte that is not."""
+    """Text of bytes that must be UTF-8; `InputError` names the line of the first byte that is not."""
     data = data.removeprefix(b"\xef\xbb\xbf")
     try:
-        return data.decode("ascii")
+        return data.decode("utf-8")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(
@@ -69,10 +75,10 @@ def decode(path: Path, data: bytes) -> str:
         ) from None
 
 
-def rows(path: Path) -> Iterator[Row]:
-    """Line number and words of each line that is not blank."""
+def rows(path: Path, comments: re.Pattern[str] = COMMENT) -> Iterator[Row]:
+    """Line number and words of each line that is not blank, without its comment."""
     for line, text in enumerate(decode(path, read_bytes(path)).split("\n"), 1):
-        words = text.split()
+        words = (comments.split(text, maxsplit=1)[0] if "#" in text else text).split()
         if words:
             yield line, words
 
@@ -99,7 +105,7 @@ def parse(path: Path, source: Iterable[Row], ids: int, numbers: int, layout: str
             if "_" in "".join(words):  # Python reads 1_000 as a number, no file means it so
                 raise ValueError
             integers.extend(map(int, words[:ids]))
-            floats.extend(map(float, words[ids:]))
+            floats.extend(_numbers(words[ids:]))
         except (ValueError, OverflowError):
             raise InputError(f"{path}:{line}: {_culprit(words, ids)}; a line holds {layout}") from None
         lines.append(line)
@@ -113,6 +119,23 @@ def parse(path: Path, source: Iterable[Row], ids: int, numbers: int, layout: str
     )
 
 
+def _numbers(words: list[str]) -> list[float]:
+    try:
+        return list(map(float, words))
+    except ValueError:
+        return list(map(_number, words))
+
+
+def _number(word: str) -> float:
+    """A number as C, C++ or MATLAB may write it: ``-nan(ind)`` and ``1.#QNAN`` are NaN."""
+    try:
+        return float(word)
+    except ValueError:
+        if _NAN.fullmatch(word):
+            return math.nan
+        raise
+
+
 def _culprit(words: list[str], ids: int) -> str:
     for k, word in enumerate(words):
         try:
@@ -121,7 +144,7 @@ def _culprit(words: list[str], ids: int) -> str:
             if k < ids:
                 array("q", [int(word)])
             else:
-                float(word)
+                _number(word)
         except (ValueError, OverflowError):
             return f"{shown(word)} is not {'a camera id' if k < ids else 'a number'}"
     raise AssertionError("every word was readable")

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.core.errors import InputError, shown
 from bench.core.problem import Floats
+from bench.formats.format import Beginning, Format, RotationsFile
 from bench.formats.graph import GraphFile, Ids, build, checked_rotations, distinct, first
 from bench.formats.lines import Table, check_plain, decode, parse, read_bytes, rows
 
@@ -60,9 +61,10 @@ def read_folder(folder: Path) -> GraphFile:
 
 
 def read_bundle(path: Path) -> Floats:
-    """Rotations (N, 3, 3) of the cameras of a Bundler v0.3 file, NaN where one was not registered (all zero).
+    """Rotations (N, 3, 3) of the cameras of a Bundler v0.3 file, NaN where one was not registered.
 
-    They map world to camera, in Bundler's axes, as the edges of ``EGs.txt`` do. Points are not read.
+    That is where the focal length is 0, whatever the rotation, or the rotation is all zero. They map world to camera,
+    in Bundler's axes, as the edges of ``EGs.txt`` do. Points are not read.
 
     Raises
     ------
@@ -74,17 +76,30 @@ def read_bundle(path: Path) -> Floats:
     if len(lines) < 2 + _CAMERA_LINES * count:
         camera = (len(lines) - 2) // _CAMERA_LINES
         raise InputError(f"{path}:{len(lines)}: the file ends in camera {camera} of {count}; get it again")
-    places = [2 + _CAMERA_LINES * camera + k for camera in range(count) for k in (1, 2, 3)]
-    table = parse(path, ((k + 1, lines[k].split()) for k in places), 0, 3, "a row of a camera's rotation")
-    matrices = table.numbers.reshape(count, 3, 3)
-    registered = np.flatnonzero((matrices != 0).any(axis=(1, 2)))
+    places = [2 + _CAMERA_LINES * camera + k for camera in range(count) for k in range(4)]
+    table = parse(path, ((k + 1, lines[k].split()) for k in places), 0, 3, "focal length and distortion, or a rotation")
+    blocks = table.numbers.reshape(count, 4, 3)
+    matrices = blocks[:, 1:]
+    registered = np.flatnonzero((blocks[:, 0, 0] != 0) & (matrices != 0).any(axis=(1, 2)))
 
     def where(row: int) -> str:
-        return table.where(3 * int(registered[row]))
+        return table.where(4 * int(registered[row]) + 1)
 
     truth = np.full_like(matrices, np.nan)
     truth[registered] = checked_rotations(matrices[registered], where)
     return truth
+
+
+def read_bundle_rotations(path: Path) -> RotationsFile:
+    """Read `read_bundle`, or that file of a scene's folder; the camera in place k of it has the id k.
+
+    Raises
+    ------
+    InputError
+        As `read_bundle`.
+    """
+    rotations = read_bundle(path / BUNDLE if path.is_dir() else path)
+    return RotationsFile(np.arange(len(rotations)), rotations)
 
 
 def _edge_table(path: Path) -> Table:
@@ -144,3 +159,33 @@ def _head(path: Path, count: int) -> list[str]:
     if not data.strip():
         raise InputError(f"{path}: the file is empty")
     return decode(path, data).removesuffix("\n").split("\n")
+
+
+def _is_folder(beginning: Beginning) -> bool:
+    return any((beginning.path / name).is_file() for name in (EDGES, BUNDLE)) and not beginning.data
+
+
+FORMATS = (
+    Format(
+        "1dsfm",
+        "scene of 1DSfM: a folder with EGs.txt and cc.txt, truth in gt_bundle.out",
+        ("/",),
+        _is_folder,
+        graph=read_folder,
+        rotations=read_bundle_rotations,
+    ),
+    Format(
+        "egs",
+        f"EGs.txt of 1DSfM: {_EDGE_LAYOUT}",
+        ("EGs.txt",),
+        lambda beginning: beginning.has_line(2, 12),
+        graph=read_egs,
+    ),
+    Format(
+        "bundler",
+        "gt_bundle.out: Bundler v0.3, rotations in Bundler's axes",
+        (".out",),
+        lambda beginning: beginning.data.startswith(b"# Bundle"),
+        rotations=read_bundle_rotations,
+    ),
+)

@@ -1,78 +1,66 @@
-"""Absolute rotations as files."""
+"""Absolute rotations as text, as `solve` writes them, and where rotations are written to."""
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
 
-import numpy as np
-from numpy.typing import NDArray
-
-from bench.core.errors import InputError
-from bench.core.problem import Floats
-
-Ids = NDArray[np.integer[Any]]
-Writer = Callable[[Ids, Floats], None]
+from bench.formats.format import Beginning, Format, RotationsFile, Solution
+from bench.formats.graph import GraphFile, distinct
+from bench.formats.lines import parse, rows
+from bench.formats.npz import known_rotations
 
 _COLUMNS = ["camera", *(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))]
 
 
-def rotations_writer(path: str | Path) -> Writer:
-    """What writes rotations to `path`, found before there are any, so that a bad path costs no computation.
-
-    Parameters
-    ----------
-    path
-        ``.npz`` (arrays ``cameras`` and ``rotations``), ``.txt`` (a line a camera: its id and R_i row by row,
-        parted by spaces, after a ``#`` line that names the columns) or ``.csv`` (the same with commas and a
-        plain header).
-
-    Returns
-    -------
-    A function of the ids (n,) and the rotations (n, 3, 3), world to camera, NaN where a camera was not solved. It
-    writes all digits, and replaces a file that exists only by a whole one.
+def read_rotations_text(path: Path) -> RotationsFile:
+    """Read a line a camera: its id and R_i row by row, parted by spaces or commas; NaN where it was not solved.
 
     Raises
     ------
     InputError
-        Where the ending is another or there is no such folder; from the function, where it cannot be written.
+        Naming the file and line.
     """
-    path = Path(path)
-    write = _WRITERS.get(path.suffix.lower())
-    if write is None:
-        raise InputError(f"{path}: rotations are written as .npz, .txt or .csv; choose one of these endings")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}; make it first")
-
-    def replace(cameras: Ids, rotations: Floats) -> None:
-        part = path.with_name(f".{path.name}.part")
-        try:
-            with part.open("wb") as file:
-                write(file, cameras, rotations)
-            part.replace(path)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error.strerror}") from error
-        finally:
-            part.unlink(missing_ok=True)
-
-    return replace
+    split = ((line, " ".join(words).replace(",", " ").split()) for line, words in rows(path))
+    lines = ((line, words) for line, words in split if words[:1] != _COLUMNS[:1])
+    table = parse(path, lines, 1, 9, " ".join(_COLUMNS))
+    distinct(table)
+    rotations = known_rotations(table.numbers.reshape(-1, 3, 3), table.where)
+    return RotationsFile(table.ids[:, 0], rotations)
 
 
-def _write_npz(file: BinaryIO, cameras: Ids, rotations: Floats) -> None:
-    np.savez(file, cameras=cameras, rotations=rotations)
+def _writer(lead: str, separator: str) -> Callable[[Path, Solution, GraphFile | None], None]:
+    def write(path: Path, solution: Solution, graph: GraphFile | None) -> None:
+        lines = [lead + separator.join(_COLUMNS)]
+        for camera, rotation in zip(solution.cameras.tolist(), solution.rotations.reshape(-1, 9).tolist(), strict=True):
+            lines.append(separator.join([str(camera), *map(repr, rotation)]))
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    return write
 
 
-def _write_txt(file: BinaryIO, cameras: Ids, rotations: Floats) -> None:
-    _write_lines(file, cameras, rotations, "# ", " ")
+def _is_text(beginning: Beginning) -> bool:
+    return beginning.has_line(1, 9)
 
 
-def _write_csv(file: BinaryIO, cameras: Ids, rotations: Floats) -> None:
-    _write_lines(file, cameras, rotations, "", ",")
+def _is_csv(beginning: Beginning) -> bool:
+    words = [" ".join(line).replace(",", " ").split() for line in beginning.lines]
+    return any(line == _COLUMNS for line in words)
 
 
-def _write_lines(file: BinaryIO, cameras: Ids, rotations: Floats, lead: str, separator: str) -> None:
-    file.write(f"{lead}{separator.join(_COLUMNS)}\n".encode())
-    for camera, rotation in zip(cameras.tolist(), rotations.reshape(-1, 9).tolist(), strict=True):
-        file.write(f"{separator.join([str(camera), *map(repr, rotation)])}\n".encode())
-
-
-_WRITERS = {".npz": _write_npz, ".txt": _write_txt, ".csv": _write_csv}
+FORMATS = (
+    Format(
+        "rotations",
+        "text: camera, then R row by row (9), world to camera",
+        (".txt",),
+        _is_text,
+        rotations=read_rotations_text,
+        write=_writer("# ", " "),
+    ),
+    Format(
+        "csv",
+        "the same with commas and a header",
+        (".csv",),
+        _is_csv,
+        rotations=read_rotations_text,
+        write=_writer("", ","),
+    ),
+)
