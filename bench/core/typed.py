@@ -1,0 +1,136 @@
+"""Dataclasses from what a JSON or TOML file holds: names and types follow the annotations, strictly."""
+
+import dataclasses
+import types
+import typing
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, TypeVar
+
+from bench.core.errors import InputError, shown, suggestion
+
+T = TypeVar("T")
+
+_PLAIN = {
+    str: "text",
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    types.NoneType: "none",
+}
+
+
+def read(cls: type[T], content: Mapping[str, Any], where: str) -> T:
+    """An instance of a dataclass from the values of its fields; a field that has a default may be left out.
+
+    Annotations may be ``str``, ``bool``, ``int``, ``float`` (which takes whole numbers too), ``Literal``, other
+    dataclasses, ``tuple[X, ...]`` (a list), ``Mapping[str, X]``, ``Any``, and unions of these, such as ``X | None``.
+
+    Parameters
+    ----------
+    content
+        Values by the names of the fields.
+    where
+        What is read, for messages: ``suite quick``.
+
+    Raises
+    ------
+    InputError
+        On an unknown or missing name, a value of another type, or one that the dataclass refuses by a ValueError.
+    """
+    return typing.cast(T, _instance(cls, content, f"{where}:"))
+
+
+def _instance(cls: type[Any], content: Any, at: str) -> Any:
+    if not isinstance(content, Mapping):
+        raise _wrong("a table", content, at)
+    fields = _fields(cls)
+    for key in content:
+        if key not in fields:
+            raise InputError(f"{at.removesuffix(':')}: unknown key {shown(key)}{suggestion(str(key), fields)}")
+    values = {}
+    for key, (hint, needed) in fields.items():
+        if key in content:
+            values[key] = _value(hint, content[key], f"{at}{' ' if at.endswith(':') else '.'}{key}")
+        elif needed:
+            raise InputError(f"{at.removesuffix(':')}: key '{key}' is missing")
+    try:
+        return cls(**values)
+    except ValueError as error:
+        raise InputError(f"{at.removesuffix(':')}: {error}") from error
+
+
+@cache
+def _fields(cls: Any) -> Mapping[str, tuple[Any, bool]]:
+    """Of each field its annotation, and whether it has no default."""
+    hints = typing.get_type_hints(cls)
+    missing = dataclasses.MISSING
+    return {
+        f.name: (hints[f.name], f.default is missing and f.default_factory is missing)
+        for f in dataclasses.fields(cls)
+        if f.init
+    }
+
+
+def _value(hint: Any, value: Any, at: str) -> Any:
+    """`value` as what the annotation says."""
+    if hint in _PLAIN:
+        return _plain(hint, value, at)
+    if hint is Any:
+        return value
+    if dataclasses.is_dataclass(hint):
+        return _instance(typing.cast("type[Any]", hint), value, at)
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is tuple and isinstance(value, list | tuple):
+        return tuple(_value(arguments[0], entry, f"{at}[{k}]") for k, entry in enumerate(value))
+    if origin is Mapping and isinstance(value, Mapping):
+        return {
+            _plain(str, key, at): _value(arguments[1], entry, f"{at}.{_brief(key)}") for key, entry in value.items()
+        }
+    if origin is typing.Literal and any(value == allowed and type(value) is type(allowed) for allowed in arguments):
+        return value
+    if origin in (types.UnionType, typing.Union):
+        return _one_of(arguments, value, at)
+    raise _wrong(_spelled(hint), value, at)
+
+
+def _one_of(options: tuple[Any, ...], value: Any, at: str) -> Any:
+    """`value` as the first of several annotations that it fits; a complaint about a part of it is the most telling."""
+    complaint = None
+    for option in options:
+        try:
+            return _value(option, value, at)
+        except InputError as error:
+            if not str(error).startswith(f"{at} must be"):
+                complaint = error
+    raise complaint or _wrong(" or ".join(map(_spelled, options)), value, at)
+
+
+def _plain(hint: type, value: Any, at: str) -> Any:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise InputError(f"{at} has more than 64 bits, which no number here needs")
+    if hint is float and number:
+        return float(value)
+    if isinstance(value, hint) and (hint is not int or number):
+        return value
+    raise _wrong(_PLAIN[hint], value, at)
+
+
+def _wrong(wanted: str, value: Any, at: str) -> InputError:
+    return InputError(f"{at.removesuffix(':')} must be {wanted}, not {shown(value)}")
+
+
+def _spelled(hint: Any) -> str:
+    """What an annotation takes, in words."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is typing.Literal:
+        return " or ".join(map(repr, arguments))
+    if origin is tuple:
+        return f"a list of {_spelled(arguments[0])}"
+    return _PLAIN.get(hint, "a table")
+
+
+def _brief(key: Any) -> str:
+    text = str(key)
+    return text if text.isprintable() and len(text) <= 80 else shown(text)
