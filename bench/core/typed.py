@@ -41,7 +41,7 @@ def read(cls: type[T], content: Mapping[str, Any], where: str) -> T:
     return typing.cast(T, _instance(cls, content, f"{where}:"))
 
 
-def _instance(cls: type[Any], content: Any, at: str) -> Any:
+def _instance(cls: Any, content: Any, at: str) -> Any:
     if not isinstance(content, Mapping):
         raise _wrong("a table", content, at)
     fields = _fields(cls)
@@ -79,7 +79,7 @@ def _value(hint: Any, value: Any, at: str) -> Any:
     if hint is Any:
         return value
     if dataclasses.is_dataclass(hint):
-        return _instance(typing.cast("type[Any]", hint), value, at)
+        return _instance(hint, value, at)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is tuple and isinstance(value, list | tuple):
         return tuple(_value(arguments[0], entry, f"{at}[{k}]") for k, entry in enumerate(value))
