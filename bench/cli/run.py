@@ -43,12 +43,6 @@ def run(
     ] = None,
     timeout: Annotated[float | None, typer.Option(metavar="S", help="Wall clock seconds of one job.")] = None,
     memory: Annotated[float | None, typer.Option(metavar="GIB", help="Resident memory of one job.")] = None,
-    budget: Annotated[
-        str | None,
-        typer.Option(
-            metavar="B", help="Threads, time and GiB of one job in one word, such as 1c-60s-4g or 4c-10m-16g."
-        ),
-    ] = None,
     protocol: ProtocolOption = None,
     align: AlignOption = Align.L1,
     timing: Annotated[
@@ -84,7 +78,6 @@ def run(
         threads=threads,
         timeout_s=timeout,
         memory_gib=memory,
-        budget=budget,
         protocol=protocol.value if protocol else None,
         rerun=rerun.value,
         timing=timing,

@@ -82,6 +82,8 @@ def _value(hint: Any, value: Any, at: str) -> Any:
         return _instance(hint, value, at)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is tuple and isinstance(value, list | tuple):
+        if arguments[0] in (str, float) and set(map(type, value)) <= {arguments[0]}:
+            return tuple(value)  # a column may have a million entries
         return tuple(_value(arguments[0], entry, f"{at}[{k}]") for k, entry in enumerate(value))
     if origin is Mapping and isinstance(value, Mapping):
         return {

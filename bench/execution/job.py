@@ -76,13 +76,12 @@ def record_of(
     report: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Everything that is kept of a job besides its arrays."""
-    budget = {"budget": limits.budget} if limits.budget else {}
     return {
         "job": dict(job),
         "outcome": ended.kind,
         "status": ended.text,
         "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-        "limits": {"seconds": limits.seconds, "memory_gib": limits.memory_gib, "threads": threads} | budget,
+        "limits": {"seconds": limits.seconds, "memory_gib": limits.memory_gib, "threads": threads},
         "versions": provenance.versions(requires),
         "provenance": provenance.of_this_run(),
         **report,

@@ -23,13 +23,10 @@ class Limits:
         Wall clock.
     memory_gib
         Resident memory of the child and its descendants.
-    budget
-        The name of these limits, where they were given by one; see `bench.suite.budget`.
     """
 
     seconds: float
     memory_gib: float
-    budget: str = ""
 
 
 class Interrupted(Exception):  # noqa: N818 - the user's wish, not an error

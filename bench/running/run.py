@@ -18,7 +18,7 @@ from bench.plugins.selection import format_selection
 from bench.running.engines.local import Finished, LocalEngine
 from bench.running.engines.timing import TimingEngine
 from bench.storage.store import Store
-from bench.suite import budget, experiment
+from bench.suite import experiment
 from bench.suite.experiment import Cell, Experiment, Suite
 from bench.suite.plan import Plan
 
@@ -44,8 +44,6 @@ class Options:
         Override the suite's.
     jobs, threads
         How many jobs at a time, and how many threads the numerical libraries of each may use (by default one).
-    budget
-        Threads, seconds and memory of a job in one word, in the place of these three; see `bench.suite.budget`.
     protocol
         Override the protocol of every dataset that has one.
     rerun
@@ -72,7 +70,6 @@ class Options:
     threads: int | None = None
     timeout_s: float | None = None
     memory_gib: float | None = None
-    budget: str | None = None
     protocol: str | None = None
     rerun: Rerun = "never"
     timing: bool = False
@@ -117,8 +114,8 @@ class Run:
         _check_kind(self.store, options.timing)
         self.unreadable: list[str] = []  # a sentence for each record whose job is run again because of that
         chosen = self.experiment.suite
-        self.threads = options.threads or (budget.parse(chosen.budget).threads if chosen.budget else 1)
-        self.limits = Limits(chosen.timeout_s, chosen.memory_gib, "" if _given_alone(options) else chosen.budget)
+        self.threads = options.threads or 1
+        self.limits = Limits(chosen.timeout_s, chosen.memory_gib)
         self.todo = [cell for cell in self.cells if not self._done(cell)]
         if options.timing:  # methods can be compared only where they took turns
             affected = {cell.job.instance_key for cell in self.todo}
@@ -211,7 +208,8 @@ def _resolved(
         "methods": experiment.narrowed(suite.methods, methods) if methods else (*suite.methods, *plugged_in),
         "seeds": options.seeds,
         "rounds": options.rounds,
-        **_limits(options),
+        "timeout_s": options.timeout_s,
+        "memory_gib": options.memory_gib,
     }
     if datasets:
         changes["datasets"] = experiment.narrowed(suite.datasets, datasets)
@@ -228,22 +226,6 @@ def _resolved(
         protocol=options.protocol,
         timing=options.timing,
     )
-
-
-def _given_alone(options: Options) -> list[str]:
-    """Limits that were given one by one."""
-    given = {"--threads": options.threads, "--timeout": options.timeout_s, "--memory": options.memory_gib}
-    return [name for name, value in given.items() if value is not None]
-
-
-def _limits(options: Options) -> dict[str, Any]:
-    """Fields of the suite that the limits among the options override."""
-    if options.budget is None:
-        return {"timeout_s": options.timeout_s, "memory_gib": options.memory_gib}
-    if alone := _given_alone(options):
-        raise InputError(f"--budget stands for {alone[0]} too; give one of them")
-    limits = budget.parse(options.budget)
-    return {"budget": limits.name, "timeout_s": limits.seconds, "memory_gib": limits.memory_gib}
 
 
 def _check_engine(options: Options) -> None:

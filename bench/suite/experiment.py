@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bench.core import typed
 from bench.core.errors import InputError, shown, suggestion
 from bench.formats import toml_file
 from bench.plugins import selection
@@ -13,7 +14,6 @@ from bench.plugins.catalog import Catalog
 from bench.plugins.configure import parameters_of
 from bench.plugins.declare import Info, Missing, Source
 from bench.storage.store import digest
-from bench.suite import budget
 from bench.suite.plan import Job
 
 DEFAULT_SUITE = "quick"
@@ -36,8 +36,6 @@ class Suite:
         How many seeds, 0 to seeds - 1.
     timeout_s, memory_gib
         Limits of one job; in a timing run, of one round of it.
-    budget
-        Both and the number of threads in one word, in the place of these; see `bench.suite.budget`.
     rounds, baseline
         Of timing runs: how often each job is timed, and the method that the others are compared with, by
         default the first.
@@ -52,10 +50,12 @@ class Suite:
     memory_gib: float = 8.0
     rounds: int = 5
     baseline: str = ""
-    budget: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse numbers that no run can have."""
+        """Refuse what no run can have."""
+        for key in ("datasets", "methods"):
+            if not getattr(self, key):
+                raise InputError(f"'{key}' must have a selection, such as {key} = ['name[parameter=1]']")
         for key in ("seeds", "rounds"):
             if not 1 <= getattr(self, key) <= _MOST_REPEATS:
                 raise InputError(f"'{key}' is {getattr(self, key)}, not from 1 to {_MOST_REPEATS}")
@@ -96,44 +96,14 @@ def load_suite(name: str) -> Suite:
         Where there is no such suite, or the file is not one.
     """
     stem, content = toml_file.read("suite", SUITES, name)
-    return _checked_suite(stem, f"suite {name}", content)
-
-
-_FIELDS: dict[str, tuple[type, ...]] = {
-    "title": (str,),
-    "datasets": (list,),
-    "methods": (list,),
-    "seeds": (int,),
-    "timeout_s": (int, float),
-    "memory_gib": (int, float),
-    "rounds": (int,),
-    "baseline": (str,),
-    "budget": (str,),
-}
-
-
-def _checked_suite(name: str, where: str, content: dict[str, Any]) -> Suite:
-    for key, value in content.items():
-        if key not in _FIELDS:
-            raise InputError(f"{where}: unknown key {shown(key)}{suggestion(key, _FIELDS)}")
-        if not isinstance(value, _FIELDS[key]) or isinstance(value, bool):
-            raise InputError(f"{where}: '{key}' must be a {_FIELDS[key][0].__name__}, not {shown(value)}")
-    for key in ("datasets", "methods"):
-        if not content.get(key) or not all(isinstance(text, str) for text in content[key]):
-            raise InputError(f"{where}: '{key}' must be a list of selections, such as {key} = ['name[parameter=1]']")
-        content[key] = tuple(content[key])
-    if "baseline" in content and content["baseline"] not in content["methods"]:
-        guess = suggestion(content["baseline"], content["methods"])
-        raise InputError(f"{where}: the baseline {shown(content['baseline'])} is not one of its methods{guess}")
-    if "budget" in content:
-        if clash := [key for key in ("timeout_s", "memory_gib") if key in content]:
-            raise InputError(f"{where}: 'budget' stands for '{clash[0]}' too; keep one of them")
-        limits = budget.parse(content["budget"])
-        content |= {"timeout_s": limits.seconds, "memory_gib": limits.memory_gib}
-    try:
-        return Suite(name, content.pop("title", name), **content)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+    where = f"suite {name}"
+    if "name" in content:
+        raise InputError(f"{where}: its name is that of its file; leave out 'name'")
+    suite = typed.read(Suite, {"title": stem, "datasets": (), "methods": ()} | content | {"name": stem}, where)
+    if suite.baseline and suite.baseline not in suite.methods:
+        guess = suggestion(suite.baseline, suite.methods)
+        raise InputError(f"{where}: the baseline {shown(suite.baseline)} is not one of its methods{guess}")
+    return suite
 
 
 def narrowed(suite_selections: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:

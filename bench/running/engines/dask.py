@@ -46,7 +46,7 @@ from bench.storage.store import Store
 from bench.suite.experiment import Cell
 from bench.suite.plan import Job
 
-BUDGET_S = 2.0  # a chunk that has taken longer gives back the jobs that it has not begun
+CHUNK_S = 2.0  # a chunk that has taken longer gives back the jobs that it has not begun
 LONGEST = 256  # jobs of a chunk
 AHEAD = 2  # chunks in flight for each thread of a worker
 CONNECT_S = 10.0
@@ -186,7 +186,7 @@ class Supervisor(WorkerPlugin):
         with self.lock:
             self.busy += 1
         try:
-            until = time.monotonic() + BUDGET_S
+            until = time.monotonic() + CHUNK_S
             records: list[dict[str, Any]] = []
             while len(records) < len(jobs) and (not records or time.monotonic() < until):
                 job = jobs[len(records)]
@@ -289,7 +289,7 @@ class _Dispatch:
 
     def _size(self, slots: int) -> int:
         """As many jobs as fit into a chunk's time, judged by those before, but so few that all workers get some."""
-        fitting = int(BUDGET_S * self.jobs / self.seconds) if self.seconds else 1
+        fitting = int(CHUNK_S * self.jobs / self.seconds) if self.seconds else 1
         share = math.ceil(len(self.waiting) / (2 * AHEAD * slots))
         return max(1, min(fitting, share, LONGEST))
 
