@@ -108,14 +108,11 @@ def _intention(planned: "Run") -> str:
 
 
 def _list_cells(planned: "Run") -> None:
-    from bench.plugins.selection import format_selection
-
     todo = {cell.job.id for cell in planned.todo}
     for cell in planned.cells:
         job = cell.job
         state = "to run" if job.id in todo else "done"
-        method = format_selection(job.method, job.parameters)
-        typer.echo(f"{state:<7} {job.dataset} {job.instance} seed {job.seed} {method}")
+        typer.echo(f"{state:<7} {job.dataset} {job.instance} seed {job.seed} {job.label}")
     for sentence in planned.experiment.missing:
         typer.echo(f"missing: {sentence}")
     if planned.todo:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from bench.core import outcome
 from bench.core.errors import InputError
-from bench.execution.supervise import Limits
+from bench.core.limits import Limits
 from bench.plugins.catalog import catalog
-from bench.plugins.selection import format_selection
 from bench.running.engines.local import Finished, LocalEngine
 from bench.running.engines.timing import TimingEngine
 from bench.storage.store import Store
@@ -114,8 +113,7 @@ class Run:
         _check_kind(self.store, options.timing)
         self.unreadable: list[str] = []  # a sentence for each record whose job is run again because of that
         chosen = self.experiment.suite
-        self.threads = options.threads or 1
-        self.limits = Limits(chosen.timeout_s, chosen.memory_gib)
+        self.limits = Limits(chosen.timeout_s, chosen.memory_gib, options.threads or 1)
         self.todo = [cell for cell in self.cells if not self._done(cell)]
         if options.timing:  # methods can be compared only where they took turns
             affected = {cell.job.instance_key for cell in self.todo}
@@ -129,7 +127,7 @@ class Run:
     @property
     def baseline(self) -> str:
         """The suite's baseline as it is in tables, or the first method where that was not chosen."""
-        planned = [format_selection(cell.job.method, cell.job.parameters) for cell in self.cells]
+        planned = [cell.job.label for cell in self.cells]
         return self.experiment.suite.baseline if self.experiment.suite.baseline in planned else planned[0]
 
     def only(self, jobs: Collection[str]) -> "Run":
@@ -147,12 +145,14 @@ class Run:
         except InputError as error:
             self.unreadable.append(str(error))
             return False
-        if record is None or record["outcome"] == outcome.NOT_INSTALLED:
+        ended = record.outcome.kind if record else outcome.NOT_RUN
+        if record is None or ended == outcome.NOT_INSTALLED:
             return False
         if self.options.rerun == "failed":
-            return record["outcome"] in (outcome.OK, outcome.SKIPPED)
-        hit = {outcome.TIMEOUT: "seconds", outcome.OUT_OF_MEMORY: "memory_gib"}.get(record["outcome"])
-        return hit is None or record["limits"][hit] >= getattr(self.limits, hit)
+            return ended in (outcome.OK, outcome.SKIPPED)
+        if ended == outcome.TIMEOUT:
+            return record.limits.seconds >= self.limits.seconds
+        return ended != outcome.OUT_OF_MEMORY or record.limits.memory_gib >= self.limits.memory_gib
 
     def prepare(self, tell: Callable[[str], None] = lambda _: None) -> None:
         """Load the instances that are not stored yet, then keep the plan.
@@ -181,14 +181,14 @@ class Run:
             yield from finished
 
     def _engine(self) -> "LocalEngine | TimingEngine | DaskEngine":
-        workers, threads = self.options.jobs or os.cpu_count() or 1, self.threads
+        workers = self.options.jobs or os.cpu_count() or 1
         if self.options.timing:
-            return TimingEngine(self.store, self.limits, threads)
+            return TimingEngine(self.store, self.limits)
         if self.options.engine == "dask":
             from bench.running.engines.dask import DaskEngine
 
-            return DaskEngine(self.store, self.limits, workers, threads, self.options.scheduler)
-        return LocalEngine(self.store, self.limits, workers, threads)
+            return DaskEngine(self.store, self.limits, workers, self.options.scheduler)
+        return LocalEngine(self.store, self.limits, workers)
 
 
 def _resolved(

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from bench.core import typed
+from bench.core.digest import digest
 from bench.core.errors import InputError, shown, suggestion
 from bench.formats import toml_file
 from bench.plugins import selection
 from bench.plugins.catalog import Catalog
 from bench.plugins.configure import parameters_of
-from bench.plugins.declare import Info, Missing, Source
-from bench.storage.store import digest
+from bench.plugins.declare import Dataset, DatasetInfo, MethodInfo, Missing, Source
 from bench.suite.plan import Job
 
 DEFAULT_SUITE = "quick"
@@ -70,7 +70,7 @@ class Cell:
 
     job: Job
     source: Source
-    method: Info
+    method: MethodInfo
 
 
 @dataclass(frozen=True)
@@ -118,8 +118,8 @@ def narrowed(suite_selections: Sequence[str], wanted: Sequence[str]) -> tuple[st
 
 def resolve(
     suite: Suite,
-    methods: Catalog,
-    datasets: Catalog,
+    methods: Catalog[MethodInfo],
+    datasets: Catalog[DatasetInfo],
     *,
     data_dir: Path | None = None,
     protocol: str | None = None,
@@ -159,19 +159,19 @@ def _absence(dataset: str, names: Sequence[str], command: str) -> str:
     return f"{what} not on disk{which}; get {'them' if len(names) > 1 else 'it'} with: {command}"
 
 
-def instance_key(dataset: Info, configured: Any, source: Source) -> str:
+def instance_key(dataset: DatasetInfo, configured: Dataset, source: Source) -> str:
     """Identity of an instance: its dataset with every parameter, its name and what determines its bytes."""
     return digest([dataset.name, parameters_of(configured), source.name, source.revision])
 
 
 def _cells_of(
     source: Source,
-    dataset: Info,
-    configured: Any,
+    dataset: DatasetInfo,
+    configured: Dataset,
     label: str,
     seed: int,
     seeds: int,
-    methods: Iterable[tuple[Info, dict[str, Any]]],
+    methods: Iterable[tuple[MethodInfo, dict[str, Any]]],
     rounds: int,
 ) -> list[Cell]:
     """Cells of one instance. On data that no seed changes, a deterministic method needs one seed only."""
