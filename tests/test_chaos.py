@@ -75,6 +75,6 @@ def test_chaos(faulty_plugin: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert len(list(marks.iterdir())) >= 4 * 4  # grandchildren of hang, orphan, daemon and hidden_memory
     assert not [mark.name for mark in marks.iterdir() if psutil.pid_exists(int(mark.name))]
     assert not list((tmp_path / "wild" / "work").iterdir())
-    logs = [len(wild.store.record(job.id).get("log", "")) for job in jobs]  # type: ignore[union-attr]
+    logs = [len(wild.store.record(job.id).log) for job in jobs]  # type: ignore[union-attr]
     assert Counter(size > 0 for size in logs)[True] >= 4 * 2  # endless, chatter
     assert max(logs) <= 4000

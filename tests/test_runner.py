@@ -9,6 +9,7 @@ import pytest
 from bench.core.errors import InputError
 from bench.running.run import Options, Run
 from bench.scoring.results import score
+from bench.storage.record import SCHEMA
 from bench.storage.store import Store
 
 
@@ -19,7 +20,7 @@ def planned(plugin: Path, out: Path, methods: list[str], datasets: list[str] | N
 
 def finish(run: Run) -> list[str]:
     run.prepare()
-    return [record["status"] for _, record in run.execute()]
+    return [record.outcome.text for _, record in run.execute()]
 
 
 def test_resume_runs_nothing_twice(faulty_plugin: Path, tmp_path: Path) -> None:
@@ -124,7 +125,7 @@ def test_a_record_tells_where_it_comes_from(faulty_plugin: Path, tmp_path: Path)
     run = planned(faulty_plugin, tmp_path, ["faulty"], ["toy"])
     finish(run)
     record = json.loads(next((tmp_path / "records").glob("*/*.json")).read_text())
-    assert record["schema"] == 2
+    assert record["schema"] == SCHEMA
     assert record["job"]["seed"] == 0
     assert {"numpy", "scipy"} <= set(record["versions"])
     assert {"python", "cpu", "command", "git"} <= set(record["provenance"])

@@ -12,6 +12,7 @@ from bench.core.errors import InputError
 from bench.core.outcome import Outcome
 from bench.core.problem import Estimate
 from bench.execution.child import Request
+from bench.execution.execute import Ended
 from bench.execution.output import ESTIMATE_FILE
 from bench.reporting.tables import render
 from bench.reporting.tables.rows import exact_seconds
@@ -20,6 +21,7 @@ from bench.running.run import Options, Run
 from bench.scoring.metrics.speedup import speedup
 from bench.scoring.results import score
 from bench.storage.arrays import load_problem, save_estimate
+from bench.storage.record import Report
 from bench.suite.experiment import load_suite, suite_names
 
 METHODS = ["faulty[fault=[fine,random,raise]]"]
@@ -32,7 +34,7 @@ def planned(plugin: Path, out: Path | None, methods: list[str] = METHODS, **opti
 
 def finish(run: Run) -> list[str]:
     run.prepare()
-    return [record["status"] for _, record in run.execute()]
+    return [record.outcome.text for _, record in run.execute()]
 
 
 @pytest.fixture
@@ -40,16 +42,16 @@ def turns(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
     """Rounds that take no time: (instance, fault) of each child that would have been started, in order."""
     taken: list[tuple[str, str]] = []
 
-    def execute(request: Request, *_: Any) -> tuple[Outcome, dict[str, Any]]:
+    def execute(request: Request, *_: Any) -> Ended:
         fault = request.parameters.get("fault", "fine")
         instance = Path(request.problem).parent.name
         taken.append((instance, fault))
         if fault == "raise" and taken.count((instance, fault)) == 2:
-            return Outcome(outcome.ERROR, "second time"), {}
+            return Ended(Outcome(outcome.ERROR, "second time"))
         identity = np.tile(np.eye(3), (load_problem(Path(request.problem)).n, 1, 1))
         save_estimate(Path(request.folder, ESTIMATE_FILE), Estimate(identity))
         seconds = {"fine": 2.0, "random": 1.0, "raise": 4.0}[fault] * len(taken)
-        return Outcome(outcome.OK), {"solves_s": [9 * seconds, seconds, seconds / 9], "waited": 0.3}
+        return Ended(Outcome(outcome.OK), Report(solves_s=(9 * seconds, seconds, seconds / 9), waited=0.3))
 
     monkeypatch.setattr(timing, "execute", execute)
     return taken
@@ -72,13 +74,13 @@ def test_a_record_has_every_round_and_their_median(
     finish(run)
     record = run.store.record(run.cells[0].job.id)
     assert record is not None
-    assert record["round_s"] == [2.0, 12.0, 14.0]
-    assert (record["solve_s"], record["min_s"]) == (12.0, 2.0)
-    assert record["job"]["rounds"] == 3
+    assert record.round_s == (2.0, 12.0, 14.0)
+    assert (record.report.solve_s, record.report.waited) == (12.0, 0.3)
+    assert record.job.rounds == 3
     failed = run.store.record(run.cells[2].job.id)
     assert failed is not None
-    assert failed["status"] == "error(second time)"
-    assert "round_s" not in failed
+    assert failed.outcome.text == "error(second time)"
+    assert failed.round_s == ()
 
 
 def test_an_instance_is_timed_again_as_a_whole(
