@@ -175,26 +175,9 @@ def decode(content: Mapping[str, Any], where: str) -> Plan:
             raise IndexError("negative")
         rows = zip(*(getattr(read.jobs, column.name) for column in fields(_Columns)), strict=True)
         jobs = tuple(
-            _job(key, read.instances[place], read.methods[method], seed, rounds)
+            Job(id=key, seed=seed, rounds=rounds, **vars(read.instances[place]), **vars(read.methods[method]))
             for key, place, method, seed, rounds in rows
         )
     except (ValueError, IndexError) as error:
         raise InputError(f"{where}: its jobs do not fit together ({error})") from error
     return Plan(read.suite, jobs, read.missing, read.command, read.baseline)
-
-
-def _job(key: str, place: _Place, configured: _Configured, seed: int, rounds: int) -> Job:
-    return Job(
-        id=key,
-        dataset=place.dataset,
-        instance=place.instance,
-        instance_key=place.instance_key,
-        method=configured.method,
-        title=configured.title,
-        origin=configured.origin,
-        parameters=configured.parameters,
-        seed=seed,
-        rounds=rounds,
-        source_hash=configured.source_hash,
-        dataset_origin=place.dataset_origin,
-    )
