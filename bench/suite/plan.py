@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from bench.core import typed
@@ -152,8 +152,9 @@ def encode(plan: Plan) -> dict[str, Any]:
             configured.append(_Configured(job.method, job.title, job.origin, job.parameters, job.source_hash))
         rows.append((job.id, places.setdefault(place, len(places)), methods[spelled], job.seed, job.rounds))
     columns = _Columns(*map(tuple, zip(*rows, strict=True))) if rows else _Columns((), (), (), (), ())
-    head = (plan.suite, plan.command, plan.baseline, plan.missing)
-    return asdict(_Written(*head, tuple(places), tuple(configured), columns))
+    written = _Written(plan.suite, plan.command, plan.baseline, plan.missing, tuple(places), tuple(configured), columns)
+    parts = {"instances": list(map(vars, places)), "methods": list(map(vars, configured)), "jobs": vars(columns)}
+    return vars(written) | parts  # not `asdict`, which would copy every entry of the columns
 
 
 def decode(content: Mapping[str, Any], where: str) -> Plan:
