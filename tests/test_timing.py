@@ -10,7 +10,8 @@ import pytest
 from bench.core import outcome
 from bench.core.errors import InputError
 from bench.core.outcome import Outcome
-from bench.core.problem import Estimate
+from bench.core.problem import Estimate, Problem
+from bench.execution import child
 from bench.execution.child import Request
 from bench.execution.execute import Ended
 from bench.execution.output import ESTIMATE_FILE
@@ -20,7 +21,7 @@ from bench.running.engines import timing
 from bench.running.run import Options, Run
 from bench.scoring.metrics.speedup import speedup
 from bench.scoring.results import score
-from bench.storage.arrays import load_problem, save_estimate
+from bench.storage.arrays import load_problem, save_estimate, save_problem
 from bench.storage.record import Report
 from bench.suite.experiment import load_suite, suite_names
 
@@ -108,6 +109,36 @@ def test_real_children(faulty_plugin: Path, tmp_path: Path) -> None:
     solves = [line.split()[0] for line in mark.read_text().splitlines()]
     assert len(set(solves)) == 2 * (2 + 2 + 1)  # a child for each round, and none after a crash
     assert max(solves.count(pid) for pid in solves) > 3  # what is fast is repeated within a round
+
+
+def test_no_repetition_finds_what_another_has_left_in_its_problem(tmp_path: Path) -> None:
+    plugin = tmp_path / "leaver.py"
+    plugin.write_text(LEAVER)
+    problem = tmp_path / "problem.npz"
+    save_problem(problem, Problem(2, np.array([(0, 1)]), np.eye(3)[None]))
+    seen = tmp_path / "seen"
+    request = Request(str(problem), str(plugin), "leaver", {"seen": str(seen)}, 0, 1, str(tmp_path), repeat_s=0.02)
+    result = child.solve(request, child.prepare(request))
+    found = seen.read_text().split()
+    assert len(result.report.solves_s) == len(found) - 1 > 2
+    assert set(found) == {"fresh"}
+
+
+LEAVER = """
+from dataclasses import dataclass
+import numpy as np
+from bench import method
+
+@method("leaver", title="Leaver")
+@dataclass(frozen=True)
+class Leaver:
+    seen: str = ""
+    def solve(self, problem, rng):
+        with open(self.seen, "a") as file:
+            file.write("used " if "mine" in vars(problem) else "fresh ")
+        vars(problem)["mine"] = True
+        return np.tile(np.eye(3), (problem.n, 1, 1))
+"""
 
 
 def test_ordinary_and_timing_runs_do_not_share_a_folder(faulty_plugin: Path, tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from bench.core import typed
@@ -152,8 +152,9 @@ def encode(plan: Plan) -> dict[str, Any]:
             configured.append(_Configured(job.method, job.title, job.origin, job.parameters, job.source_hash))
         rows.append((job.id, places.setdefault(place, len(places)), methods[spelled], job.seed, job.rounds))
     columns = _Columns(*map(tuple, zip(*rows, strict=True))) if rows else _Columns((), (), (), (), ())
-    head = (plan.suite, plan.command, plan.baseline, plan.missing)
-    return asdict(_Written(*head, tuple(places), tuple(configured), columns))
+    written = _Written(plan.suite, plan.command, plan.baseline, plan.missing, tuple(places), tuple(configured), columns)
+    parts = {"instances": list(map(vars, places)), "methods": list(map(vars, configured)), "jobs": vars(columns)}
+    return vars(written) | parts  # not `asdict`, which would copy every entry of the columns
 
 
 def decode(content: Mapping[str, Any], where: str) -> Plan:
@@ -175,26 +176,9 @@ def decode(content: Mapping[str, Any], where: str) -> Plan:
             raise IndexError("negative")
         rows = zip(*(getattr(read.jobs, column.name) for column in fields(_Columns)), strict=True)
         jobs = tuple(
-            _job(key, read.instances[place], read.methods[method], seed, rounds)
+            Job(id=key, seed=seed, rounds=rounds, **vars(read.instances[place]), **vars(read.methods[method]))
             for key, place, method, seed, rounds in rows
         )
     except (ValueError, IndexError) as error:
         raise InputError(f"{where}: its jobs do not fit together ({error})") from error
     return Plan(read.suite, jobs, read.missing, read.command, read.baseline)
-
-
-def _job(key: str, place: _Place, configured: _Configured, seed: int, rounds: int) -> Job:
-    return Job(
-        id=key,
-        dataset=place.dataset,
-        instance=place.instance,
-        instance_key=place.instance_key,
-        method=configured.method,
-        title=configured.title,
-        origin=configured.origin,
-        parameters=configured.parameters,
-        seed=seed,
-        rounds=rounds,
-        source_hash=configured.source_hash,
-        dataset_origin=place.dataset_origin,
-    )
