@@ -8,9 +8,13 @@ from typing import TYPE_CHECKING, Any
 from bench.core.errors import InputError, suggestion
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
+    from numpy.typing import NDArray
 
     from bench.core.problem import Estimate, Floats
+
+    Edges = NDArray[np.integer[Any]] | Sequence[Sequence[int]]
 
 
 def run(
@@ -61,6 +65,79 @@ def run(
     for _ in planned.execute():
         pass
     return score(planned.store, align, planned.options.protocol).frame
+
+
+def solve(
+    edges: "Edges",
+    rotations: "Floats",
+    method: str | None = None,
+    weights: "Floats | None" = None,
+    n: int | None = None,
+    seed: int = 0,
+    *,
+    supervised: bool = False,
+    timeout_s: float = 3600.0,
+    memory_gib: float = 16.0,
+    plugins: Sequence[str | Path] = (),
+) -> "Estimate":
+    """Absolute rotations from relative ones.
+
+    Parameters
+    ----------
+    edges
+        (m, 2) cameras i and j of each measurement, in either order.
+    rotations
+        (m, 3, 3) R_ij = R_i R_j^T, where R_i maps world to camera.
+    method
+        A selection, such as ``"method[parameter=2]"``; by default `bench.methods.DEFAULT`.
+    weights
+        (m,) how far each measurement is to be trusted, relative to the others.
+    n
+        Number of cameras; by default up to the largest in `edges`.
+    seed
+        What a method that draws random numbers draws from.
+    supervised
+        In a child process with limits, as jobs of a run are, in place of this process.
+    timeout_s, memory_gib
+        Its limits.
+    plugins
+        Files with more methods.
+
+    Returns
+    -------
+    The estimate, its rotations (n, 3, 3) NaN where a camera is not in the largest connected component.
+
+    Raises
+    ------
+    InputError
+        On arrays that are no problem, an unknown method, and where a supervised child does not end well. In this
+        process, whatever the method raises comes through.
+    """
+    import numpy as np
+
+    from bench.core.problem import Problem, oriented
+    from bench.plugins.catalog import catalog, default_method
+
+    pairs = np.asarray(edges)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu" or not len(pairs):
+        raise InputError(f"edges must be whole numbers of shape (m, 2), not {pairs.dtype} of shape {pairs.shape}")
+    measured = np.asarray(rotations, dtype=float)
+    if measured.shape != (len(pairs), 3, 3):
+        raise InputError(f"rotations must have shape ({len(pairs)}, 3, 3), not {measured.shape}")
+    problem = Problem(int(pairs.max()) + 1 if n is None else n, *oriented(pairs, measured), weights)
+    info, parameters = catalog("method", plugins).one(method or default_method())
+    if not supervised:
+        from bench.execution.here import solve_here
+
+        return solve_here(info, parameters, problem, seed)
+    from bench.core.limits import Limits
+    from bench.execution.single import SingleSolver
+
+    with SingleSolver(info, parameters, Limits(timeout_s, memory_gib)) as solver:
+        ended, _, estimate, _ = solver.solve(problem, seed)
+    if estimate is None:
+        raise InputError(f"{info.name}: {ended.text}")
+    return estimate
 
 
 def score(estimate: "Estimate | Floats", truth: "Floats", align: str = "l1") -> dict[str, float]:

@@ -21,7 +21,7 @@ INLIER_COST = 0.5  # GTSAM's cost of a residual at the threshold
 class GtsamGNC(Started):
     """Minimises the costs of `gnc`, each weighted problem by Levenberg-Marquardt.
 
-    1. Start from `init`; a prior on the first camera, known to be an inlier, fixes the gauge.
+    1. Start from `init`; a prior holds the first camera, known to be an inlier, where it starts.
     2. Solve with all weights 1 and choose mu from the largest residual.
     3. For each mu: weights from the residuals, then Levenberg-Marquardt from the start of 1 (not from the
        last solution).
@@ -65,7 +65,8 @@ class GtsamGNC(Started):
         found = start_rotations(self.init, problem, rng)
         conversion = Stopwatch()
         with conversion.running():
-            start, graph = values_of(found), _graph(problem, threshold)
+            start = values_of(found)
+            graph = _graph(problem, start, threshold)
         optimizer = gtsam.GncLMOptimizer(graph, start, self._parameters(prior=problem.m))
         optimizer.setInlierCostThresholds(INLIER_COST)
         values = optimizer.optimize()
@@ -93,8 +94,8 @@ class GtsamGNC(Started):
         return parameters
 
 
-def _graph(problem: Problem, threshold: float) -> Any:
-    """GTSAM's factor graph, the prior last; residuals in units of the threshold."""
+def _graph(problem: Problem, start: Any, threshold: float) -> Any:
+    """GTSAM's factor graph, the prior last: camera 0 as it starts. Residuals are in units of the threshold."""
     import gtsam
 
     graph = gtsam.NonlinearFactorGraph()
@@ -102,5 +103,5 @@ def _graph(problem: Problem, threshold: float) -> Any:
     for (i, j), rotation in zip(problem.edges.tolist(), problem.rotations, strict=True):
         graph.add(gtsam.BetweenFactorRot3(i, j, gtsam.Rot3(rotation), noise))
     gauge = gtsam.noiseModel.Isotropic.Sigma(3, PRIOR_SIGMA)
-    graph.add(gtsam.PriorFactorRot3(0, gtsam.Rot3(), gauge))
+    graph.add(gtsam.PriorFactorRot3(0, start.atRot3(0), gauge))
     return graph

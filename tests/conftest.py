@@ -93,6 +93,9 @@ class Faulty:
             time.sleep(1000)
         elif self.fault == "slow":
             time.sleep(0.3)
+        elif self.fault == "gate":
+            while problem.n > 4 and not Path(self.mark + ".open").exists():
+                time.sleep(0.01)
         elif self.fault == "orphan":
             if os.fork() == 0:
                 Path(self.mark).write_text(str(os.getpid()))

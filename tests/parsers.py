@@ -8,7 +8,7 @@ import json
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +28,10 @@ from format_seeds import (
 )
 from scenes import UNREGISTERED, bundle_camera, egs_line, write_scene
 
-from bench.core import so3
+from bench.core import so3, typed
 from bench.core.errors import InputError, suggestion
+from bench.core.limits import Limits
+from bench.core.outcome import Outcome
 from bench.core.problem import Instance, Problem
 from bench.datasets._files.archive import damaged
 from bench.datasets._files.download import Archive
@@ -41,6 +43,7 @@ from bench.papers.layout import load_layout
 from bench.papers.published import read_published
 from bench.plugins import selection
 from bench.plugins.catalog import catalog, scan
+from bench.storage.record import Record, Report
 from bench.storage.store import Store
 from bench.suite.experiment import load_suite
 from bench.suite.plan import Job, Plan, encode
@@ -110,7 +113,7 @@ def _store_file(pattern: str, read: Callable[[Store], object]) -> Read:
             store.add_plan(PLAN)
             store.add_instance(JOB.instance_key, INSTANCE)
             (folder / "estimate.npz").write_bytes(_npz(**ESTIMATE))
-            store.add_record(JOB.id, RECORD, folder / "estimate.npz")
+            store.add_record(RECORD, folder / "estimate.npz")
         path = next((folder / "run").glob(pattern))
         path.write_bytes(data)
         return read(Store(folder / "run"))
@@ -141,7 +144,7 @@ def _plugin(data: bytes, folder: Path) -> object:
         found = scan("method", [str(path)])
         assert found.entries or found.broken.keys() <= {str(path)}
         assert not any("\n" in why for why in found.broken.values())
-        return [(info.summary, info.not_installed, suggestion("x", found.entries)) for info in found]
+        return [(info.summary, info.not_installed(), suggestion("x", found.entries)) for info in found]
     finally:
         for name in set(sys.modules) - before:
             del sys.modules[name]
@@ -175,7 +178,11 @@ JOB = Job(
 PLAN = Plan("quick", (JOB,), ("nothing is missing",), "bench run", "")
 ESTIMATE = {"rotations": TRUTH, "edge_weights": np.ones(5), "checkpoints": np.stack([TRUTH, TRUTH])}
 CHECKPOINTS = [{"iteration": k, "seconds": 0.1 * k, "diagnostics": {"gap": 1.5}} for k in (1, 2)]
-SCALARS = {
+REPORT = {
+    "solve_s": 0.5,
+    "peak_mib": 1.0,
+    "threads": 1,
+    "warnings": ["UserWarning: x"],
     "iterations": 7,
     "stop_reason": "converged",
     "cost": 0.25,
@@ -184,16 +191,9 @@ SCALARS = {
     "notes": ["a fallback"],
     "checkpoints": CHECKPOINTS,
 }
-RECORD = {"job": asdict(JOB), "outcome": "ok", "status": "ok", "solve_s": 0.5, "limits": {"seconds": 60.0}, **SCALARS}
-RESULT = {
-    "kind": "ok",
-    "detail": "",
-    "solve_s": 0.5,
-    "peak_mib": 1.0,
-    "threads": 1,
-    "warnings": ["UserWarning: x"],
-    **SCALARS,
-}
+RESULT = {"outcome": {"kind": "ok", "detail": ""}, "report": REPORT}
+RECORD = Record(JOB, Outcome("ok"), Limits(60.0, 4.0, 2), "2026-01-01", {"numpy": "2"}, {"cpu": "x"})
+RECORD = replace(RECORD, report=typed.read(Report, REPORT, "report"), log="x", wall_s=1.0)
 METHODS = catalog("method")
 
 EGS = "\n".join(egs_line(i, j, r) for (i, j), r in zip(EDGES.tolist(), MEASURED, strict=True))
@@ -316,9 +316,9 @@ PARSERS: dict[str, Parser] = {
         (_json({"archive": "0" * 64, "files": {"Alamo/EGs.txt": "ab"}}),),
         _file("manifest.json", lambda path: damaged(path.parent, Archive("", "0" * 64, 1))),
     ),
-    "plan": Parser((_json({**encode(PLAN), "schema": 2}),), _store_file("plans/*.json", lambda store: store.jobs())),
+    "plan": Parser((_json(encode(PLAN)),), _store_file("plans/*.json", lambda store: store.jobs())),
     "record": Parser(
-        (_json(RECORD),),
+        (_json(RECORD.to_json()),),
         _store_file("records/**/*.json", lambda store: (store.record(JOB.id), store.estimate(JOB.id))),
     ),
     "estimate": Parser(

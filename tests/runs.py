@@ -8,9 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from bench.core import so3
+from bench.core.digest import digest
+from bench.core.limits import Limits
+from bench.core.outcome import Outcome
 from bench.core.problem import Checkpoint, Estimate, Floats, Instance
 from bench.storage.arrays import save_estimate
-from bench.storage.store import Store, digest
+from bench.storage.record import Moment, Record, Report
+from bench.storage.store import Store
 from bench.suite.plan import Job, Plan
 from tests.graphs import random_edges, simulated
 
@@ -80,29 +84,27 @@ def made_run(
 
 def _finish(store: Store, job: Job, method: Made, truth: Floats, rng: np.random.Generator) -> None:
     status = method.status if not method.only or job.instance in method.only else "ok"
-    record = {
-        "job": dataclasses.asdict(job),
-        "outcome": status.partition("(")[0],
-        "status": status,
-        "finished": f"2026-01-01T00:00:0{job.seed}+00:00",
-        "limits": {"seconds": 60, "memory_gib": 4},
-        "versions": {"numpy": "2.0", method.name: "1.0"},
-        "provenance": {"bench": "0.1.0", "git": "abc", "python": "3.11", "cpu": "a CPU", "host": "a host"},
-        "threads": 1,
-    }
-    if status != "ok":
-        store.add_record(job.id, record | {"log": method.log}, None)
+    kind, _, detail = status.partition("(")
+    record = Record(
+        job,
+        Outcome(kind, detail.removesuffix(")")),  # type: ignore[arg-type]
+        Limits(60, 4),
+        finished=f"2026-01-01T00:00:0{job.seed}+00:00",
+        versions={"numpy": "2.0", method.name: "1.0"},
+        provenance={"bench": "0.1.0", "git": "abc", "python": "3.11", "cpu": "a CPU", "host": "a host"},
+        log=method.log,
+    )
+    if not record.outcome.ok:
+        store.add_record(record, None)
         return
     steps = [_turned(truth, method, rng, 1 + 2.0 * k) for k in range(method.checkpoints, -1, -1)]
-    moments = [
-        {"iteration": 10 * k, "seconds": method.seconds * k, "diagnostics": {}} for k in range(method.checkpoints)
-    ]
-    states = tuple(Checkpoint(rotations=state, **facts) for state, facts in zip(steps, moments, strict=False))
-    record |= {"solve_s": method.seconds, "peak_mib": 3.0, "checkpoints": moments, "notes": [], "iterations": 7}
+    moments = tuple(Moment(10 * k, method.seconds * k) for k in range(method.checkpoints))
+    states = tuple(Checkpoint(m.iteration, m.seconds, state) for state, m in zip(steps, moments, strict=False))
+    report = Report(solve_s=method.seconds, peak_mib=3.0, checkpoints=moments, iterations=7)
     with store.work_folder() as work:
         path = work / "estimate.npz"
         save_estimate(path, Estimate(steps[-1], checkpoints=states))
-        store.add_record(job.id, record, path)
+        store.add_record(dataclasses.replace(record, report=report), path)
 
 
 def _turned(truth: Floats, method: Made, rng: np.random.Generator, factor: float) -> Floats:

@@ -2,8 +2,8 @@
 
 import csv
 import io
-import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +14,13 @@ from scipy import stats
 
 from bench.core import so3
 from bench.core.errors import InputError
+from bench.core.outcome import CRASHED, Outcome
 from bench.reporting.tables.compared import comparison_grid, verdict
 from bench.scoring.comparison import Comparison, compare
 from bench.scoring.inference.ratio import Ratio, error_ratio, mean_ratio, time_ratio
 from bench.scoring.metrics.errors import summary
 from bench.scoring.results import Results
-from bench.storage.arrays import load_estimate
+from bench.storage.store import Store
 
 CAMERAS = 60
 
@@ -33,7 +34,7 @@ def scored(
     **more: object,
 ) -> Results:
     """A run in which a method's errors are a factor times what is drawn for each scene and camera."""
-    rows, errors = [], {}
+    rows, errors, by_job = [], {}, {}
     for k in range(scenes):
         place = ("d", f"s{k}", "all")
         base = np.random.default_rng(k).gamma(2, 1, (seeds, CAMERAS))
@@ -49,11 +50,13 @@ def scored(
                 own = factor * base[seed] * noise[seed] if status == "ok" else np.full(CAMERAS, np.nan)
                 errors.setdefault(place, {}).setdefault((method, ""), []).append(own)
                 row = {"dataset": "d", "instance": f"s{k}", "instance_key": f"{k}-{seed}", "protocol": "all"}
-                row |= {"method": method, "params": "", "seed": seed, "status": status}
+                job = f"{k}-{method}-{seed}"
+                by_job[job] = own
+                row |= {"method": method, "params": "", "seed": seed, "status": status, "outcome": status, "job": job}
                 row |= {"n_solved": CAMERAS if status == "ok" else 0}
                 rows.append(row | summary(own) | more)
     held = {place: {m: tuple(e) for m, e in own.items()} for place, own in errors.items()}
-    return Results(pd.DataFrame(rows), held, {}, (), "l1", {})
+    return Results(pd.DataFrame(rows), held, {}, (), "l1", {}, by_job)
 
 
 def verdicts(found: Comparison, level: str = "method") -> dict[str, set[str]]:
@@ -126,8 +129,7 @@ def test_the_threshold_says_what_is_no_regression() -> None:
 
 def test_one_bad_scene_of_many_is_a_regression() -> None:
     old, new = scored({"a": 1.0}, 5), scored({"a": 1.0}, 5)
-    place = ("d", "s3", "all")
-    new.errors[place]["a", ""] = (3 * old.errors[place]["a", ""][0],)  # type: ignore[index]
+    new.job_errors["3-a-0"] = 3 * old.job_errors["3-a-0"]  # type: ignore[index]
     found = compare(old, new)
     assert verdicts(found) == {"a": {"cannot be told"}}
     told = found.rows[(found.rows["level"] == "scene") & (found.rows["verdict"] == "worse")]
@@ -206,15 +208,17 @@ def worsened(run: Path, copy: Path) -> Path:
     """A copy of a run in which one method's cameras are turned at random, and another one's job has crashed."""
     shutil.copytree(run, copy)
     for path in (copy / "records").glob("*/*.json"):
-        record = json.loads(path.read_text())
-        if record["job"]["method"] == "l1-irls":
+        store = Store(copy)
+        record = store.record(path.stem)
+        assert record is not None
+        if record.job.method == "l1-irls":
             estimate = copy / "estimates" / path.parent.name / f"{path.stem}.npz"
-            rotations = load_estimate(estimate, record).rotations
+            rotations = store.estimate(path.stem).rotations
             turned = so3.exp(0.3 * np.random.default_rng(0).standard_normal((len(rotations), 3))) @ rotations
             np.savez(estimate, **dict(np.load(estimate)) | {"rotations": turned})
             path.touch()  # as if both had been written anew
         else:
-            path.write_text(json.dumps(record | {"outcome": "crashed", "status": "crashed(SIGSEGV)"}))
+            store.add_record(replace(record, outcome=Outcome(CRASHED, "SIGSEGV")), None)
     return copy
 
 

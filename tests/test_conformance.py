@@ -62,8 +62,8 @@ CONFIGURATIONS = [
 @pytest.mark.parametrize("text", CONFIGURATIONS)
 def test_built_in_methods_conform(text: str) -> None:
     for info, parameters in METHODS.select([text]):
-        if info.not_installed:
-            pytest.skip(f"{info.name}: {info.install_hint}")
+        if info.not_installed():
+            pytest.skip(f"{info.name}: {info.install_hint()}")
         findings = list(check_method(info, parameters))
         assert len(findings) == len(CHECKS)
         assert [f for f in findings if f.result == "failed"] == []

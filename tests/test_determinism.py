@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 from test_conformance import CONFIGURATIONS
 
-from bench.execution.supervise import Limits
+from bench.core.digest import digest
+from bench.core.limits import Limits
 from bench.plugins.catalog import catalog
 from bench.plugins.selection import format_selection
 from bench.running.conformance import check_method
 from bench.running.engines.local import LocalEngine
 from bench.running.run import Options, Run
-from bench.storage.store import Store, digest
+from bench.storage.store import Store
 from bench.suite.experiment import Cell
 
 PROBLEM = "erdos-renyi[n=16,missing=0.5,outliers=0.2]"
@@ -28,10 +29,10 @@ def estimates(cells: Sequence[Cell], store: Store, seed: int) -> dict[str, bytes
     """Run the cells under another seed, by an engine of their own: the bytes of every estimate, or how it failed."""
     seeded = [replace(c, job=replace(c.job, id=digest([c.job.id, seed]), seed=seed)) for c in cells]
     found = {}
-    for cell, record in LocalEngine(store, Limits(60, 4), 2, 1).run(seeded):
+    for cell, record in LocalEngine(store, Limits(60, 4), 2).run(seeded):
         name = format_selection(cell.job.method, cell.job.parameters)
-        ok = record["outcome"] == "ok"
-        found[name] = store.estimate(cell.job.id).rotations.tobytes() if ok else record["status"].encode()
+        ok = record.outcome.ok
+        found[name] = store.estimate(cell.job.id).rotations.tobytes() if ok else record.outcome.text.encode()
     return found
 
 
@@ -81,7 +82,7 @@ def test_another_method_or_dataset_changes_nobody_s_numbers(faulty_plugin: Path,
     others = Run("quick", methods[::-1], datasets[::-1], Options(out=tmp_path / "b", plugins=(faulty_plugin,), seeds=2))
     for run in (alone, others):
         run.prepare()
-        assert {record["outcome"] for _, record in run.execute()} == {"ok"}
+        assert {record.outcome.kind for _, record in run.execute()} == {"ok"}
     shared = {cell.job.id for cell in alone.cells}
     assert len(shared) == 2
     assert shared <= {cell.job.id for cell in others.cells}

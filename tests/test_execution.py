@@ -8,10 +8,10 @@ import numpy as np
 import psutil
 import pytest
 
+from bench.core.limits import Limits
 from bench.core.problem import Problem
 from bench.execution import launch
 from bench.execution.single import Answer, SingleSolver
-from bench.execution.supervise import Limits
 from bench.plugins.catalog import catalog
 
 LIMITS = Limits(seconds=30, memory_gib=1.0)
@@ -45,16 +45,15 @@ def solve(plugin: Path, fault: str, limits: Limits = LIMITS, mark: str = "", see
     ],
 )
 def test_every_ending_has_its_row(faulty_plugin: Path, fault: str, status: str) -> None:
-    ended, report, estimate = solve(faulty_plugin, fault)
-    assert ended.text == status
-    assert (estimate is not None) == (status == "ok")
-    assert report["wall_s"] > 0
+    answer = solve(faulty_plugin, fault)
+    assert answer.outcome.text == status
+    assert (answer.estimate is not None) == (status == "ok")
 
 
 def test_output_of_a_failed_child_is_kept(faulty_plugin: Path) -> None:
-    _, report, _ = solve(faulty_plugin, "raise")
-    assert "no such thing" in report["log"]
-    assert "Traceback" in report["log"]
+    log = solve(faulty_plugin, "raise").log
+    assert "no such thing" in log
+    assert "Traceback" in log
 
 
 def is_running(pid: int) -> bool:
@@ -66,14 +65,14 @@ def is_running(pid: int) -> bool:
 
 def test_timeout_ends_a_child_that_ignores_term_and_its_grandchild(faulty_plugin: Path, tmp_path: Path) -> None:
     mark = tmp_path / "grandchild"
-    ended, _, _ = solve(faulty_plugin, "hang", Limits(seconds=1.5, memory_gib=1), str(mark))
+    ended = solve(faulty_plugin, "hang", Limits(seconds=1.5, memory_gib=1), str(mark)).outcome
     assert ended.text == "timeout(1.5 s)"
     assert not is_running(int(mark.read_text()))
 
 
 def test_a_grandchild_does_not_outlive_a_child_that_ended_well(faulty_plugin: Path, tmp_path: Path) -> None:
     mark = tmp_path / "grandchild"
-    ended, _, _ = solve(faulty_plugin, "orphan", mark=str(mark))
+    ended = solve(faulty_plugin, "orphan", mark=str(mark)).outcome
     assert ended.text == "ok"
     deadline = time.monotonic() + 5
     while is_running(int(mark.read_text())) and time.monotonic() < deadline:
@@ -82,17 +81,16 @@ def test_a_grandchild_does_not_outlive_a_child_that_ended_well(faulty_plugin: Pa
 
 
 def test_memory_limit_is_on_resident_memory(faulty_plugin: Path) -> None:
-    ended, _, _ = solve(faulty_plugin, "memory", Limits(seconds=60, memory_gib=0.6))
+    ended = solve(faulty_plugin, "memory", Limits(seconds=60, memory_gib=0.6)).outcome
     assert ended.text == "out-of-memory(0.6 GiB)"
 
 
 def test_threads_are_pinned_in_the_child(faulty_plugin: Path) -> None:
-    _, report, _ = solve(faulty_plugin, "fine")
-    assert report["threads"] == 1
+    assert solve(faulty_plugin, "fine").report.threads == 1
 
 
 def test_random_numbers_come_from_the_seed(faulty_plugin: Path) -> None:
-    first, again, other = (solve(faulty_plugin, "random", seed=seed)[2] for seed in (1, 1, 2))
+    first, again, other = (solve(faulty_plugin, "random", seed=seed).estimate for seed in (1, 1, 2))
     assert first is not None
     assert again is not None
     assert other is not None
@@ -102,30 +100,30 @@ def test_random_numbers_come_from_the_seed(faulty_plugin: Path) -> None:
 
 def test_without_fork_a_fresh_interpreter_does_the_same(faulty_plugin: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(launch, "CAN_FORK", False)
-    assert solve(faulty_plugin, "fine")[0].text == "ok"
-    assert solve(faulty_plugin, "segfault")[0].text == "crashed(SIGSEGV)"
+    assert solve(faulty_plugin, "fine").outcome.text == "ok"
+    assert solve(faulty_plugin, "segfault").outcome.text == "crashed(SIGSEGV)"
 
 
 def test_a_server_that_dies_is_replaced(faulty_plugin: Path) -> None:
     info = catalog("method", [faulty_plugin])["faulty"]
     problem = Problem(2, np.array([(0, 1)]), np.eye(3)[None])
     with SingleSolver(info, {}, LIMITS) as solver:
-        assert solver.solve(problem)[0].text == "ok"
+        assert solver.solve(problem).outcome.text == "ok"
         server = solver.launcher.servers[()]
         os.kill(server.process.pid, 9)
         server.reader.join(timeout=10)
-        assert solver.solve(problem)[0].text == "ok"
+        assert solver.solve(problem).outcome.text == "ok"
 
 
 def test_a_disconnected_graph_is_solved_on_its_largest_component(faulty_plugin: Path) -> None:
     info = catalog("method", [faulty_plugin])["faulty"]
     problem = Problem(5, np.array([(0, 1), (2, 3), (2, 4)]), np.tile(np.eye(3), (3, 1, 1)))
     with SingleSolver(info, {}, LIMITS) as solver:
-        _, report, estimate = solver.solve(problem)
-    assert estimate is not None
-    assert np.isnan(estimate.rotations[:2]).all()
-    assert np.isfinite(estimate.rotations[2:]).all()
-    assert report["notes"] == ["disconnected graph: solved on its largest component, 3 of 5 cameras"]
+        answer = solver.solve(problem)
+    assert answer.estimate is not None
+    assert np.isnan(answer.estimate.rotations[:2]).all()
+    assert np.isfinite(answer.estimate.rotations[2:]).all()
+    assert answer.report.notes == ("disconnected graph: solved on its largest component, 3 of 5 cameras",)
 
 
 def test_a_requirement_that_kills_its_importer_costs_its_own_row(
@@ -136,5 +134,5 @@ def test_a_requirement_that_kills_its_importer_costs_its_own_row(
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     text = faulty_plugin.read_text().replace('title="Faulty"', 'title="Faulty", requires=("deadly_library",)')
     faulty_plugin.write_text(text)
-    ended, _, _ = solve(faulty_plugin, "fine")
+    ended = solve(faulty_plugin, "fine").outcome
     assert ended.text == "crashed(the fork server died while importing what the method requires)"

@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 
 from bench.core.problem import Checkpoint, Estimate, Problem
 from bench.execution.output import ESTIMATE_FILE, RESULT_FILE, UnusableError, read_output
-from bench.execution.validate import MOST_TEXT, kept_warnings, scalars, what_is_wrong
+from bench.execution.validate import MOST_TEXT, kept_warnings, reported, what_is_wrong
 from bench.plugins.catalog import catalog
 from bench.running.run import Options, Run
 from bench.scoring.results import score
+from bench.storage.record import Moment, Report
 
 PROBLEM, TRUTH = simulated(random_edges(5, 0.8))
 N, M = PROBLEM.n, PROBLEM.m
@@ -141,10 +142,11 @@ def test_what_can_be_scored_is_stored_as_plain_numbers() -> None:
         checkpoints=[checkpoint(diagnostics={"gap": np.float64(1)})],
     )
     assert what_is_wrong(PROBLEM, good, 1.0) == ""
-    kept = scalars(good)
-    assert (kept["iterations"], kept["cost"], kept["certificate"], kept["notes"]) == (3, 0.5, -1.0, ["a note"])
-    assert kept["checkpoints"] == [{"iteration": 1, "seconds": 0.1, "diagnostics": {"gap": 1.0}}]
-    assert {type(value) for value in kept.values()} == {int, str, float, list}
+    kept = reported(Report(), good)
+    assert kept == Report(
+        iterations=3, cost=0.5, certificate=-1.0, notes=("a note",), checkpoints=(Moment(1, 0.1, {"gap": 1.0}),)
+    )
+    assert {type(value) for value in (kept.iterations, kept.cost, kept.certificate)} == {int, float}
 
 
 anything = st.one_of(
@@ -161,7 +163,7 @@ def test_any_fields_are_valid_or_said_to_be_wrong(fields: dict[str, Any]) -> Non
     answer = estimate(**fields)
     said = what_is_wrong(PROBLEM, answer, 1.0)
     if not said:
-        scalars(answer)
+        reported(Report(), answer)
 
 
 def test_warnings_without_end_are_cut() -> None:
@@ -181,11 +183,13 @@ def test_warnings_without_end_are_cut() -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "{}", "[]", "null", "[" * 100_000, '{"kind": "ok"}',
-     '{"kind": "fine", "detail": ""}', '{"kind": "ok", "detail": 5}',
-     '{"kind": "ok", "detail": "", "solve_s": "x"}', '{"kind": "error", "detail": "", "outcome": "ok"}',
-     '{"kind": "ok", "detail": "", "solve_s": 1, "notes": [5]}', '{"kind": "timeout", "detail": ""}',
-     '{"kind": "ok", "detail": "", "solve_s": 1, "peak_mib": 1, "checkpoints": []}'],
+    ["", "{}", "[]", "null", "[" * 100_000, '{"outcome": {"kind": "ok"}}',
+     '{"outcome": {"kind": "fine"}, "report": {}}', '{"outcome": {"kind": "ok", "detail": 5}, "report": {}}',
+     '{"outcome": {"kind": "error"}, "report": {"solve_s": "x"}}',
+     '{"outcome": {"kind": "error"}, "report": {}, "limits": {}}', '{"outcome": {"kind": "timeout"}, "report": {}}',
+     '{"outcome": {"kind": "error"}, "report": {"notes": [5]}}',
+     '{"outcome": {"kind": "error"}, "report": {"round_s": [1]}}',
+     '{"outcome": {"kind": "ok"}, "report": {"solve_s": 1, "peak_mib": 1}}'],
 )  # fmt: skip
 def test_a_report_that_no_child_of_ours_writes_is_unusable(tmp_path: Path, text: str) -> None:
     assert read_output(tmp_path) is None
@@ -245,7 +249,8 @@ class Hostile:
             for k in range(20_000):
                 warnings.warn(f"number {k}")
         elif self.fault == "forge":
-            (report(problem) / "result.json").write_text(json.dumps({"kind": "ok", "detail": "", "solve_s": 0}))
+            told = {"outcome": {"kind": "ok"}, "report": {"solve_s": 0, "peak_mib": 0}}
+            (report(problem) / "result.json").write_text(json.dumps(told))
             os._exit(0)
         return identity
 
@@ -295,7 +300,7 @@ def test_every_hostile_method_has_its_row_and_touches_nobody(tmp_path: Path) -> 
     warned = next(cell.job.id for cell in run.cells if cell.job.parameters.get("fault") == "warn")
     record = run.store.record(warned)
     assert record is not None
-    assert len(record["warnings"]) == 50
+    assert len(record.report.warnings) == 50
 
 
 # --- problems made by hand ---------------------------------------------------------------------------

@@ -25,7 +25,7 @@ KILLS = int(os.environ.get("BENCH_KILLS", "4"))
 PLUGIN = Path(__file__).with_name("chaos_plugin.py")
 METHODS = ["chaos[copy=[0,1,2,3,4,5,6,7],fault=[slow,well,leave]]"]
 DATASETS = ["toy[n=[4,5]]"]
-MOST_S = 2.5  # from when the jobs begin to the kill: the fork server takes one, the jobs two
+MOST_JOBS = 40  # that are done from when the jobs begin to the kill
 
 HARNESS = f"""
 import sys
@@ -93,7 +93,7 @@ def test_a_harness_that_is_killed_loses_and_repeats_nothing(
         folders += 1
         store, file = Store(tmp_path / f"run{folders}"), tmp_path / f"starts{folders}"
         at_kills: list[tuple[set[str], Counter[str]]] = []  # what was finished, and what had been started how often
-        while kills < KILLS and kill(harness(store.folder, faulty_plugin, file), chance):
+        while kills < KILLS and kill(harness(store.folder, faulty_plugin, file), store, chance):
             kills += 1
             finished = {name for job_id, name in names.items() if store.record(job_id) is not None}
             at_kills.append((finished, starts_of(file)))
@@ -108,12 +108,18 @@ def test_a_harness_that_is_killed_loses_and_repeats_nothing(
         print(f"{len(at_kills) - 2} kills, with so many jobs done: {[len(finished) for finished, _ in at_kills[:-2]]}")
 
 
-def kill(process: subprocess.Popen[str], chance: random.Random) -> bool:
-    """Kill the harness at a random moment, and see that all its processes go; False where it was done before."""
+def records_in(store: Store) -> int:
+    return len(list(store.folder.glob("records/*/*.json")))
+
+
+def kill(process: subprocess.Popen[str], store: Store, chance: random.Random) -> bool:
+    """Kill the harness after a random number of jobs, and see that all its processes go; False where it was done."""
     with process:
         if chance.random() < 0.9:
             process.stdout.readline()  # type: ignore[union-attr]
-        time.sleep(chance.uniform(0, MOST_S))
+        enough = records_in(store) + chance.randrange(MOST_JOBS)
+        while process.poll() is None and records_in(store) < enough:
+            time.sleep(0.002)
         family = psutil.Process(process.pid).children(recursive=True) if process.poll() is None else []
         process.kill()
     _, left = psutil.wait_procs(family, timeout=20)

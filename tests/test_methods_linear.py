@@ -149,6 +149,18 @@ def test_rings_and_complete_graphs_of_any_size_are_solved(graph: Callable[[int],
             assert errors_deg(method.solve(problem, RNG).rotations, truth).max() < 1e-6, (n, method)
 
 
+@pytest.mark.parametrize("method", [Spectral(), Spectral(normalised=False), MartinecPajdla()], ids=str)
+@pytest.mark.parametrize("edges", [random_edges(120, 1.0), star(120), ring(120)], ids=["complete", "star", "ring"])
+def test_cameras_that_are_all_alike_are_no_harder(method: Spectral | MartinecPajdla, edges: Ints) -> None:
+    """Where all measurements are the identity rounding is alike too, and stays in the space that is searched."""
+    problem = Problem(int(edges.max()) + 1, edges, np.tile(np.eye(3), (len(edges), 1, 1)))
+    estimate = method.solve(problem, RNG)
+    assert problem.residuals(estimate.rotations).max() < 1e-9
+    assert estimate.stop_reason == "eigenvectors converged"
+    assert estimate.iterations is not None
+    assert estimate.iterations < 20
+
+
 @pytest.mark.parametrize("multiplicities", [[3, 27], [27, 3], [1] * 30, [3, 1, 22, 4], [10, 10, 10], [2, 2, 26], [30]])
 def test_every_eigenpair_asked_for_comes_whatever_the_multiplicities(multiplicities: list[int]) -> None:
     rng = np.random.default_rng(0)

@@ -60,7 +60,7 @@ def run(faulty_plugin: Path, tmp_path: Path) -> Run:
     options = Options(out=tmp_path / "run", plugins=(faulty_plugin, plugin))
     run = Run("quick", ["wanderer", "l1-irls"], ["toy[n=15]"], options)
     run.prepare()
-    assert [record["status"] for _, record in run.execute()] == ["ok", "ok"]
+    assert [record.outcome.text for _, record in run.execute()] == ["ok", "ok"]
     return run
 
 

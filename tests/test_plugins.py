@@ -74,8 +74,8 @@ def test_unknown_names_get_the_nearest(tmp_path: Path) -> None:
 
 def test_missing_packages_are_seen_without_importing(tmp_path: Path) -> None:
     info = catalog("method", [write(tmp_path / "mine.py", "mine", requires="('numpy', 'not_there')")])["mine"]
-    assert info.not_installed == ("not_there",)
-    assert info.install_hint == "python -m pip install not_there"
+    assert info.not_installed() == ("not_there",)
+    assert info.install_hint() == "python -m pip install not_there"
 
 
 @pytest.mark.parametrize(

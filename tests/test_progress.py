@@ -16,16 +16,24 @@ import pytest
 from commands import bench
 from rich.console import Console
 
+from bench.core.limits import Limits
+from bench.core.outcome import Kind, Outcome
 from bench.running.progress import board as board_module
 from bench.running.progress.board import Board
 from bench.running.progress.pace import Pace, Task, remaining_s, span
+from bench.storage.record import Record, Report
 from bench.suite.plan import Job
 
 SIZES = (1e4, 1e5, 1e6)
 
 
-def record(solve_s: float, besides_s: float = 0.0) -> dict[str, Any]:
-    return {"outcome": "ok", "solve_s": solve_s, "wall_s": solve_s + besides_s}
+JOB = Job("0", "toy", "toy", "0", "a", "A", "", {}, 0)
+
+
+def record(solve_s: float | None, besides_s: float = 0.0, kind: Kind = "ok") -> Record:
+    return Record(
+        JOB, Outcome(kind), Limits(60, 4), "", report=Report(solve_s=solve_s), wall_s=(solve_s or 0.0) + besides_s
+    )
 
 
 def pace_of(times: Callable[[float], float], sizes: Sequence[float] = SIZES, configured: str = "a") -> Pace:
@@ -74,9 +82,9 @@ def test_what_the_first_jobs_wait_for_is_not_expected_of_all() -> None:
 
 def test_a_job_without_a_time_teaches_nothing_and_a_failed_one_its_wall_clock() -> None:
     pace = Pace()
-    pace.see(Task("a", "a", 1e5), {"outcome": "not-installed"})
+    pace.see(Task("a", "a", 1e5), record(None, kind="not-installed"))
     assert pace.seen == 0
-    pace.see(Task("a", "a", 1e5), {"outcome": "timeout", "wall_s": 60.0})
+    pace.see(Task("a", "a", 1e5), record(None, 60.0, "timeout"))
     assert pace.expect(Task("a", "a", 1e5)) == pytest.approx(60)
 
 
@@ -107,7 +115,7 @@ class Clock:
 
 def jobs_of(methods: int, instances: int) -> list[Job]:
     return [
-        Job(f"{i}-{m}", "toy", f"an-instance-with-a-long-name-{i}", str(i), f"method-{m}", "", "", {"depth": m}, 0)
+        Job(f"{i}x{m}", "toy", f"an-instance-with-a-long-name-{i}", str(i), f"method-{m}", "", "", {"depth": m}, 0)
         for i in range(instances)
         for m in range(methods)
     ]
@@ -131,7 +139,7 @@ def test_the_table_tells_what_is_done_failed_running_and_left() -> None:
     board, clock = board_of(jobs)
     assert "ETA unknown" in drawn(board)[-1]
     clock.now = 1.0
-    board.end(jobs[1], {"outcome": "timeout", "wall_s": 1.0})
+    board.end(jobs[1], record(None, 1.0, "timeout"))
     board.end(jobs[0], record(1.0))
     clock.now = 2.0
     lines = drawn(board)

@@ -68,9 +68,9 @@ def test_an_estimate_that_differs_is_told_by_its_angle(faulty_plugin: Path, tmp_
 )
 def test_a_failure_is_repeated_too(faulty_plugin: Path, tmp_path: Path, fault: str, status: str) -> None:
     ready = prepare(recorded(faulty_plugin, tmp_path / "run", f"faulty[fault={fault}]"))
-    ended, _, estimate = ready.supervised()
-    assert ended.text == ready.record["status"] == status
-    assert ready.same(ended, estimate)
+    answer = ready.supervised()
+    assert answer.outcome.text == ready.record.outcome.text == status
+    assert ready.same(answer.outcome, answer.estimate)
 
 
 def test_the_limits_of_the_record_hold(faulty_plugin: Path, tmp_path: Path) -> None:
@@ -78,7 +78,7 @@ def test_the_limits_of_the_record_hold(faulty_plugin: Path, tmp_path: Path) -> N
     record = recorded(faulty_plugin, tmp_path / "run", f"faulty[fault=hang,mark={mark}]", timeout_s=1.0)
     assert "now:  timeout(1 s)" in bench("rerun", record).stdout
     record = recorded(faulty_plugin, tmp_path / "other", "faulty", threads=3)
-    assert prepare(record).threads == 3
+    assert prepare(record).record.limits.threads == 3
 
 
 def test_a_changed_source_is_said(faulty_plugin: Path, tmp_path: Path) -> None:
@@ -124,16 +124,6 @@ def test_a_changed_instance_is_taken_from_the_run(faulty_plugin: Path, tmp_path:
     assert sentence.endswith("that of today is used")
     with pytest.raises(InputError, match="Alamo is not on disk; get it with"):
         prepare(alone)
-
-
-def test_a_record_of_before_sources_were_kept(faulty_plugin: Path, tmp_path: Path) -> None:
-    record = recorded(faulty_plugin, tmp_path / "run", "spanning-tree", "erdos-renyi[n=10,missing=0.2]", plugins=())
-    content = json.loads(record.read_text())
-    del content["job"]["source_hash"], content["job"]["dataset_origin"], content["limits"]["threads"]
-    record.write_text(json.dumps(content))
-    ready = prepare(record)
-    assert ready.differences == ("the record does not say which source the method had",)
-    assert ready.threads == 1
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"job": {"id": "x"}}', "\0"])

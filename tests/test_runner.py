@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from bench.core.errors import InputError
+from bench.plugins.catalog import catalog
 from bench.running.run import Options, Run
 from bench.scoring.results import score
+from bench.storage.record import SCHEMA
 from bench.storage.store import Store
 
 
@@ -19,7 +21,7 @@ def planned(plugin: Path, out: Path, methods: list[str], datasets: list[str] | N
 
 def finish(run: Run) -> list[str]:
     run.prepare()
-    return [record["status"] for _, record in run.execute()]
+    return [record.outcome.text for _, record in run.execute()]
 
 
 def test_resume_runs_nothing_twice(faulty_plugin: Path, tmp_path: Path) -> None:
@@ -105,6 +107,57 @@ def test_what_was_planned_and_did_not_run_has_its_row(faulty_plugin: Path, tmp_p
     assert list(score(run.store).frame["status"]) == ["not-run"]
 
 
+CHOOSY = """
+import sys
+from dataclasses import dataclass
+import numpy as np
+from bench import method
+
+@method("choosy", title="Choosy", requires=("not_there",))
+@dataclass(frozen=True)
+class Choosy:
+    needs: str = "not_there"
+
+    @property
+    def requires(self):
+        return (self.needs,) if self.needs else ()
+
+    def solve(self, problem, rng):
+        print(sorted({"wave", "colorsys"} & set(sys.modules)))
+        return np.tile(np.eye(3), (problem.n, 1, 1))
+"""
+
+
+@pytest.mark.parametrize("options", [{}, {"timing": True, "rounds": 1}], ids=["local", "timing"])
+def test_what_is_required_follows_the_configuration(
+    faulty_plugin: Path, tmp_path: Path, options: dict[str, object]
+) -> None:
+    plugin = tmp_path / "choosy.py"
+    plugin.write_text(CHOOSY)
+    plugins = (faulty_plugin, plugin)
+    run = planned(
+        faulty_plugin, tmp_path / "run", ["choosy[needs=['',wave,not_there]]"], ["toy"], plugins=plugins, **options
+    )
+    run.prepare()
+    found = {cell.job.parameters["needs"]: record for cell, record in run.execute()}
+    hint = "not-installed(python -m pip install not_there)"
+    assert [found[needs].outcome.text for needs in ("", "wave", "not_there")] == ["ok", "ok", hint]
+    assert [set(found[needs].log.split()) for needs in ("", "wave")] == [
+        {"[]"},
+        {"['wave']"},
+    ]  # each has a server of its own
+    assert "wave" in found["wave"].versions
+    assert catalog("method", plugins)["choosy"].not_installed() == ("not_there",)
+
+
+@pytest.mark.parametrize("requires", ["'numpy'", "('a.b',)", "[3]"])
+def test_requires_of_another_form_is_one_sentence(tmp_path: Path, requires: str) -> None:
+    plugin = tmp_path / "choosy.py"
+    plugin.write_text(CHOOSY.replace("(self.needs,) if self.needs else ()", requires))
+    with pytest.raises(InputError, match="method 'choosy': requires must be a tuple of top-level packages"):
+        catalog("method", [plugin])["choosy"].not_installed()
+
+
 def test_the_child_is_never_given_the_truth(faulty_plugin: Path, tmp_path: Path) -> None:
     run = planned(faulty_plugin, tmp_path, ["faulty"], ["toy"])
     run.prepare()
@@ -124,7 +177,7 @@ def test_a_record_tells_where_it_comes_from(faulty_plugin: Path, tmp_path: Path)
     run = planned(faulty_plugin, tmp_path, ["faulty"], ["toy"])
     finish(run)
     record = json.loads(next((tmp_path / "records").glob("*/*.json")).read_text())
-    assert record["schema"] == 2
+    assert record["schema"] == SCHEMA
     assert record["job"]["seed"] == 0
     assert {"numpy", "scipy"} <= set(record["versions"])
     assert {"python", "cpu", "command", "git"} <= set(record["provenance"])

@@ -6,6 +6,7 @@ import shutil
 import socket
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +17,14 @@ from commands import bench
 from conftest import FAULTY
 
 from bench.core.errors import InputError
+from bench.core.outcome import TIMEOUT, Outcome
 from bench.running.run import Options, Run
 from bench.scoring.cache import scores_of
 from bench.scoring.results import score
-from bench.storage import migration
 from bench.storage.doctor import examine, repair
 from bench.storage.merge import merge
-from bench.storage.store import Store
+from bench.storage.record import SCHEMA
+from bench.storage.store import VERSION, Store
 from bench.suite.plan import Job, Plan, decode, encode
 
 METHODS = ["faulty[fault=[fine,random,raise]]"]
@@ -35,7 +37,7 @@ def planned(plugin: Path, out: Path, methods: list[str] | None = None, **options
 
 def finish(run: Run) -> list[str]:
     run.prepare()
-    return [record["status"] for _, record in run.execute()]
+    return [record.outcome.text for _, record in run.execute()]
 
 
 def table(folder: Path) -> list[dict[str, object]]:
@@ -61,42 +63,49 @@ def store(finished: Path, tmp_path: Path) -> Store:
 
 def test_a_plan_survives_its_file() -> None:
     jobs = tuple(
-        Job(f"{k:024x}", "toy[n=3]", "toy3", f"{k % 2:024x}", "m", "M", "file.py", {"a": [1, k % 3]}, k, 0)
+        Job(f"{k:024x}", "toy[n=3]", "toy3", f"{k % 2:024x}", "m", "M", "file.py", {"a": k % 3, "b": "x"}, k, 0)
         for k in range(7)
     )
     plan = Plan("quick", jobs, ("one is missing",), "python -m bench run", "m")
-    assert decode(json.loads(json.dumps(encode(plan)))) == plan
+    assert decode(json.loads(json.dumps(encode(plan))), "plan") == plan
 
 
 @pytest.mark.parametrize("key", ["../../outside", "", "a/b", "a\\b"])
 def test_a_plan_cannot_lead_out_of_its_folder(key: str) -> None:
     content = encode(Plan("quick", (Job("0", "toy", "toy3", "0", "m", "M", "file.py", {}, 0),)))
-    with pytest.raises(ValueError, match="letters and digits"):
-        decode(content | {"jobs": content["jobs"] | {"id": [key]}})
-    with pytest.raises(ValueError, match="letters and digits"):
-        decode(content | {"instances": [["toy", "toy3", key, ""]]})
+    with pytest.raises(InputError, match="letters and digits"):
+        decode(content | {"jobs": content["jobs"] | {"id": [key]}}, "plan")
+    place = content["instances"][0] | {"instance_key": key}
+    with pytest.raises(InputError, match="letters and digits"):
+        decode(content | {"instances": [place]}, "plan")
 
 
-def test_a_folder_of_the_first_layout_is_brought_up_to_date(store: Store, tmp_path: Path) -> None:
-    whole = table(store.folder)
-    old = tmp_path / "old"
-    shutil.copytree(store.folder, old)
-    for path in [*old.glob("records/*/*.json"), *old.glob("estimates/*/*.npz")]:
-        path.rename(path.parent.parent / path.name)
-    (path,) = old.glob("plans/*.json")
-    spelled_out = [{name: getattr(job, name) for name in Job.__slots__} for job in Store(old).plans()[0].jobs]
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"schema": 1, "jobs": spelled_out}))
-    (old / migration.FILE).unlink()
-    shutil.rmtree(old / "scores")
-
-    assert table(old) == whole
-    assert examine(old) == []
+def test_a_plan_whose_jobs_point_nowhere_is_refused() -> None:
+    content = encode(Plan("quick", (Job("0", "toy", "toy3", "0", "m", "M", "file.py", {}, 0),)))
+    for wrong in ({"method": [1]}, {"instance": [-1]}, {"seed": [0, 1]}):
+        with pytest.raises(InputError, match="its jobs do not fit together"):
+            decode(content | {"jobs": content["jobs"] | wrong}, "plan")
 
 
-def test_a_folder_of_a_newer_version_is_refused(store: Store) -> None:
-    (store.folder / migration.FILE).write_text('{"schema": 99}')
-    with pytest.raises(InputError, match=r"has layout 99.*upgrade"):
+@pytest.mark.parametrize("content", [None, "{", '{"schema": 2}', '{"schema": 99}'])
+def test_a_folder_of_another_version_is_refused(store: Store, content: str | None) -> None:
+    (store.folder / VERSION).unlink()
+    if content is not None:
+        (store.folder / VERSION).write_text(content)
+    with pytest.raises(InputError, match=f"was written by another version of bench .* this one has {SCHEMA}"):
         Store.open(store.folder)
+
+
+def test_a_record_of_another_job_or_version_is_none(store: Store) -> None:
+    one, other, *_ = (job.id for job in store.jobs())
+    path = store.record_path(one)
+    whole = path.read_text()
+    path.write_text(store.record_path(other).read_text())
+    with pytest.raises(InputError, match="the record of another job"):
+        store.record(one)
+    path.write_text(json.dumps(json.loads(whole) | {"schema": 2}))
+    with pytest.raises(InputError, match=f"no record of version {SCHEMA}"):
+        store.record(one)
 
 
 def test_scores_are_computed_once(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,7 +127,7 @@ def test_a_record_that_changed_is_scored_again(store: Store) -> None:
     np.savez(path, rotations=truth)
     record = store.record(job.id)
     assert record is not None
-    store.add_record(job.id, record, None)
+    store.add_record(record, None)
     after = scores_of(store, [job], "l1").table["max_deg"][0].as_py()
     assert before > 1
     assert after < 1e-6
@@ -155,18 +164,25 @@ def test_a_merge_prefers_what_ended_well_and_tells_what_differs_or_cannot_be_rea
     one, other = store, Store(tmp_path / "other")
     shutil.copytree(one.folder, other.folder)
     fine, random, *_ = (job.id for job in one.jobs())
-    worse = {"outcome": "timeout", "status": "timeout(1 s)", "finished": "2999-01-01"}
-    one.add_record(fine, (one.record(fine) or {}) | worse, None)
+    ended = one.record(fine)
+    assert ended is not None
+    one.add_record(replace(ended, outcome=Outcome(TIMEOUT, "1 s"), finished="2999-01-01"), None)
     np.savez(other.estimate_path(random), rotations=np.tile(np.eye(3), (3, 1, 1)))
     raised = next(job.id for job in one.jobs() if job.parameters["fault"] == "raise")
     other.record_path(raised).write_text("{")
 
     done = merge([other.folder], one.folder)
     assert done.replaced == 1
-    assert (one.record(fine) or {})["outcome"] == "ok"
+    assert kind(one, fine) == "ok"
     assert any(f"the estimates of job {random} differ" in sentence for sentence in done.told)
     assert any(f"{raised}.json cannot be read" in sentence for sentence in done.told)
-    assert (one.record(raised) or {})["outcome"] == "error"
+    assert kind(one, raised) == "error"
+
+
+def kind(store: Store, job_id: str) -> str:
+    record = store.record(job_id)
+    assert record is not None
+    return record.outcome.kind
 
 
 def test_ordinary_and_timing_runs_are_not_merged(faulty_plugin: Path, store: Store, tmp_path: Path) -> None:
@@ -250,7 +266,7 @@ def test_an_estimate_that_finds_no_room_is_no_failure_of_its_method(faulty_plugi
         list(run.execute())
     assert run.store.record(run.cells[0].job.id) is None
     filling.unlink()
-    assert [record["status"] for _, record in run.execute()] == ["ok"]
+    assert [record.outcome.text for _, record in run.execute()] == ["ok"]
 
 
 def test_a_full_disk_is_one_sentence(faulty_plugin: Path, small_disk: Path) -> None:

@@ -18,13 +18,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.core import outcome
+from bench.core.limits import Limits
 from bench.core.problem import Estimate, Problem
 from bench.execution import launch, processes, supervise
-from bench.execution.output import LARGEST_RESULT, UnusableError, read_output
+from bench.execution.output import LARGEST_RESULT, Result, UnusableError, read_output
 from bench.execution.single import Answer, SingleSolver
-from bench.execution.supervise import Limits
 from bench.plugins.catalog import catalog
 from bench.storage.arrays import save_estimate
+from bench.storage.record import Report
 
 PLUGIN = Path(__file__).with_name("chaos_plugin.py")
 TRIANGLE = Problem(3, np.array([(0, 1), (0, 2), (1, 2)]), np.tile(np.eye(3), (3, 1, 1)))
@@ -60,31 +61,29 @@ def starts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_crash_says_where() -> None:
-    ended, report, _ = solve("segfault")
-    assert ended.text == "crashed(SIGSEGV)"
-    assert "Segmentation fault" in report["log"]
-    assert "chaos_plugin.py" in report["log"]
+    answer = solve("segfault")
+    assert answer.outcome.text == "crashed(SIGSEGV)"
+    assert "Segmentation fault" in answer.log
+    assert "chaos_plugin.py" in answer.log
 
 
 def test_what_a_job_printed_is_kept_where_it_ended_well_too() -> None:
-    _, report, _ = solve("chatter")
-    assert report["log"] == "x" * 999 + "\n"
-    _, report, _ = solve("well")
-    assert "log" not in report
+    assert solve("chatter").log == "x" * 999 + "\n"
+    assert solve("well").log == ""
 
 
 def test_of_a_method_that_forks_one_process_answers() -> None:
-    ended, _, estimate = solve("twins")
-    assert ended.text == "ok"
-    assert estimate is not None
+    answer = solve("twins")
+    assert answer.outcome.text == "ok"
+    assert answer.estimate is not None
 
 
 def test_a_kill_by_the_kernel_is_told_from_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert solve("killed")[0].text == "crashed(SIGKILL, from outside the benchmark)"
+    assert solve("killed").outcome.text == "crashed(SIGKILL, from outside the benchmark)"
     counts = iter(range(9))
     monkeypatch.setattr(outcome, "kernel_kills", lambda: next(counts))
-    assert solve("killed")[0].text == "out-of-memory(killed by the kernel: the machine has no more)"
-    assert solve("segfault")[0].text == "crashed(SIGSEGV)"
+    assert solve("killed").outcome.text == "out-of-memory(killed by the kernel: the machine has no more)"
+    assert solve("segfault").outcome.text == "crashed(SIGSEGV)"
 
 
 @pytest.mark.skipif(not launch.CAN_FORK, reason="this system has no fork server")
@@ -97,13 +96,13 @@ def test_a_job_that_loses_its_server_is_started_again(marks: Path, starts: Path)
             time.sleep(0.01)
         os.kill(alone.launcher.servers[()].process.pid, signal.SIGKILL)
         thread.join()
-    assert answers[0][0].text == "timeout(4 s)"
+    assert answers[0].outcome.text == "timeout(4 s)"
     assert len(starts.read_text().splitlines()) == 2
 
 
 @pytest.mark.skipif(not launch.CAN_FORK, reason="this system has no fork server")
 def test_a_job_that_kills_its_server_is_started_twice_at_most(starts: Path) -> None:
-    assert solve("kill_server")[0].text == "crashed(the fork server died while the job was running)"
+    assert solve("kill_server").outcome.text == "crashed(the fork server died while the job was running)"
     assert len(starts.read_text().splitlines()) == 2
 
 
@@ -116,7 +115,7 @@ def test_an_import_that_hangs_costs_its_own_row(tmp_path: Path, monkeypatch: pyt
     plugin = tmp_path / "plugin.py"
     plugin.write_text(PLUGIN.read_text().replace('title="Chaos"', 'title="Chaos", requires=("slow_library",)'))
     with SingleSolver(catalog("method", [plugin])["chaos"], {}, Limits(60, 1.0)) as alone:
-        ended, _, _ = alone.solve(TRIANGLE)
+        ended = alone.solve(TRIANGLE).outcome
     assert ended.text == "crashed(the fork server took more than 3 s while importing what the method requires)"
 
 
@@ -128,9 +127,9 @@ def test_a_fresh_interpreter_is_supervised_too(
     marks: Path, monkeypatch: pytest.MonkeyPatch, fault: str, status: str
 ) -> None:
     monkeypatch.setattr(launch, "CAN_FORK", False)
-    ended, report, _ = solve(fault, seconds=6 if status.startswith("timeout") else 30)
-    assert ended.text.startswith(status)
-    assert len(report.get("log", "")) == (4000 if fault == "endless" else 0)
+    answer = solve(fault, seconds=6 if status.startswith("timeout") else 30)
+    assert answer.outcome.text.startswith(status)
+    assert len(answer.log) == (4000 if fault == "endless" else 0)
 
 
 def test_a_fresh_interpreter_ends_with_its_harness(marks: Path) -> None:
@@ -174,7 +173,9 @@ def test_the_nearer_the_memory_limit_the_more_often_it_is_looked_at(monkeypatch:
     assert child.pauses == pytest.approx([0.1, 0.1, 0.1, 0.05, 0.01, 0.0])
 
 
-REPORT = {"kind": "ok", "detail": "", "solve_s": 0.1, "peak_mib": 0.0, "checkpoints": []}
+OK = {"kind": "ok", "detail": ""}
+TOLD = {"solve_s": 0.1, "peak_mib": 0.0}
+RESULT = {"outcome": OK, "report": TOLD}
 
 
 def left(folder: Path, report: object) -> Path:
@@ -188,14 +189,17 @@ def left(folder: Path, report: object) -> Path:
         ("", "not JSON"),
         ("{", "not JSON"),
         ("[" * 100_000, "not JSON"),
-        ([], "tells no outcome"),
-        ({"kind": "timeout", "detail": ""}, "tells no outcome"),
-        ({"kind": ["ok"], "detail": ""}, "tells no outcome"),
-        ({"kind": "ok"}, "tells no reason"),
-        (REPORT | {"solve_s": "1"}, "'solve_s' is a str"),
-        (REPORT | {"checkpoints": 3}, "'checkpoints' is a int"),
-        ({"kind": "ok", "detail": ""}, "does not tell checkpoints and peak_mib and solve_s"),
-        (REPORT, "cannot be read"),
+        ([], r"must be a table, not \[\]"),
+        ({"report": TOLD}, "key 'outcome' is missing"),
+        ({"outcome": {"kind": "timeout"}, "report": TOLD}, "'timeout' is not for a child to tell"),
+        ({"outcome": {"kind": "fine"}, "report": TOLD}, "outcome.kind must be 'ok' or 'timeout'"),
+        ({"outcome": {"kind": ["ok"]}, "report": TOLD}, r"outcome.kind must be .*, not \['ok'\]"),
+        (RESULT | {"report": TOLD | {"solve_s": "1"}}, "report.solve_s must be a number or none, not '1'"),
+        (RESULT | {"report": TOLD | {"solve_s": 10**400}}, "report.solve_s has more than 64 bits"),
+        (RESULT | {"report": TOLD | {"checkpoints": 3}}, "report.checkpoints must be a list of tables, not 3"),
+        (RESULT | {"report": TOLD | {"wall_s": 0.0}}, "report: unknown key 'wall_s'"),
+        (RESULT | {"report": {}}, "does not tell what the solution took"),
+        (RESULT, "cannot be read"),
         (" " * (LARGEST_RESULT + 1), f"has {LARGEST_RESULT + 1} bytes"),
     ],
 )
@@ -213,10 +217,10 @@ def test_no_result_is_too_odd(tmp_path_factory: pytest.TempPathFactory, content:
 
 
 def test_an_estimate_is_checked_to_its_last_byte(tmp_path: Path) -> None:
-    left(tmp_path, REPORT)
+    left(tmp_path, RESULT)
     path = tmp_path / "estimate.npz"
     save_estimate(path, Estimate(np.tile(np.eye(3), (4, 1, 1))))
-    assert read_output(tmp_path) == (outcome.Outcome(outcome.OK), {k: REPORT[k] for k in list(REPORT)[2:]})
+    assert read_output(tmp_path) == Result(outcome.Outcome(outcome.OK), Report(solve_s=0.1, peak_mib=0.0))
     whole = path.read_bytes()
     for wrong in (whole[:-1], whole[:-100], whole[: len(whole) // 2], whole.replace(b"\xf0?", b"\xf1?", 1), b""):
         path.write_bytes(wrong)
@@ -235,13 +239,13 @@ def test_an_estimate_is_checked_to_its_last_byte(tmp_path: Path) -> None:
     ],
 )
 def test_an_estimate_of_another_form_is_invalid_output(tmp_path: Path, arrays: dict[str, np.ndarray], why: str) -> None:
-    np.savez(left(tmp_path, REPORT) / "estimate.npz", **arrays)
+    np.savez(left(tmp_path, RESULT) / "estimate.npz", **arrays)
     with pytest.raises(UnusableError, match=why):
         read_output(tmp_path)
 
 
 def test_a_bomb_is_no_estimate(tmp_path: Path) -> None:
-    path = left(tmp_path, REPORT) / "estimate.npz"
+    path = left(tmp_path, RESULT) / "estimate.npz"
     np.savez_compressed(path, rotations=np.zeros((10**5, 3, 3)))
     with pytest.raises(UnusableError, match="compressed"):
         read_output(tmp_path)

@@ -16,7 +16,7 @@ from bench.scoring.metrics.theory import (
     NOISES,
     cramer_rao_rms_deg,
     cramer_rao_variances,
-    efficient_mean_deg,
+    efficient_median_deg,
     information,
 )
 
@@ -85,7 +85,7 @@ def test_no_bound_where_inliers_do_not_connect_the_cameras() -> None:
     inliers = np.array([True, False])
     problem, _ = simulated(np.array([[0, 1], [1, 2]]))
     assert np.isnan(cramer_rao_variances(problem, inliers, "tangent", 5)).all()
-    assert np.isnan(efficient_mean_deg(problem, inliers, "tangent", 5))
+    assert np.isnan(efficient_median_deg(problem, inliers, "tangent", 5))
 
 
 def test_curvature_keeps_the_bound_below_the_error_of_a_guess() -> None:
@@ -133,7 +133,9 @@ def test_least_squares_reaches_the_bound(noise: noise.Noise, noise_deg: float) -
         assert instance.truth is not None
         inliers = np.ones(instance.problem.m, dtype=bool)
         squares["bound"] += cramer_rao_rms_deg(instance.problem, inliers, noise, noise_deg) ** 2
-        efficient += efficient_mean_deg(instance.problem, inliers, noise, noise_deg)
+        bounds = cramer_rao_variances(instance.problem, inliers, noise, noise_deg)
+        flat = (3 - np.sqrt(9 - 4 * bounds)) / 2  # c_i of the bound 3 c_i (1 - c_i / 3)
+        efficient += np.degrees(np.sqrt(8 * flat / np.pi)).mean()  # mean length of a Gaussian vector
         for name, method in methods.items():
             rotations = method.solve(instance.problem, np.random.default_rng(0)).rotations
             errors = camera_errors(rotations, instance.truth, "chordal")

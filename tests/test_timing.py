@@ -10,8 +10,10 @@ import pytest
 from bench.core import outcome
 from bench.core.errors import InputError
 from bench.core.outcome import Outcome
-from bench.core.problem import Estimate
+from bench.core.problem import Estimate, Problem
+from bench.execution import child
 from bench.execution.child import Request
+from bench.execution.execute import Ended
 from bench.execution.output import ESTIMATE_FILE
 from bench.reporting.tables import render
 from bench.reporting.tables.rows import exact_seconds
@@ -19,7 +21,8 @@ from bench.running.engines import timing
 from bench.running.run import Options, Run
 from bench.scoring.metrics.speedup import speedup
 from bench.scoring.results import score
-from bench.storage.arrays import load_problem, save_estimate
+from bench.storage.arrays import load_problem, save_estimate, save_problem
+from bench.storage.record import Report
 from bench.suite.experiment import load_suite, suite_names
 
 METHODS = ["faulty[fault=[fine,random,raise]]"]
@@ -32,7 +35,7 @@ def planned(plugin: Path, out: Path | None, methods: list[str] = METHODS, **opti
 
 def finish(run: Run) -> list[str]:
     run.prepare()
-    return [record["status"] for _, record in run.execute()]
+    return [record.outcome.text for _, record in run.execute()]
 
 
 @pytest.fixture
@@ -40,16 +43,16 @@ def turns(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
     """Rounds that take no time: (instance, fault) of each child that would have been started, in order."""
     taken: list[tuple[str, str]] = []
 
-    def execute(request: Request, *_: Any) -> tuple[Outcome, dict[str, Any]]:
+    def execute(request: Request, *_: Any) -> Ended:
         fault = request.parameters.get("fault", "fine")
         instance = Path(request.problem).parent.name
         taken.append((instance, fault))
         if fault == "raise" and taken.count((instance, fault)) == 2:
-            return Outcome(outcome.ERROR, "second time"), {}
+            return Ended(Outcome(outcome.ERROR, "second time"))
         identity = np.tile(np.eye(3), (load_problem(Path(request.problem)).n, 1, 1))
         save_estimate(Path(request.folder, ESTIMATE_FILE), Estimate(identity))
         seconds = {"fine": 2.0, "random": 1.0, "raise": 4.0}[fault] * len(taken)
-        return Outcome(outcome.OK), {"solves_s": [9 * seconds, seconds, seconds / 9], "waited": 0.3}
+        return Ended(Outcome(outcome.OK), Report(solves_s=(9 * seconds, seconds, seconds / 9), waited=0.3))
 
     monkeypatch.setattr(timing, "execute", execute)
     return taken
@@ -72,13 +75,13 @@ def test_a_record_has_every_round_and_their_median(
     finish(run)
     record = run.store.record(run.cells[0].job.id)
     assert record is not None
-    assert record["round_s"] == [2.0, 12.0, 14.0]
-    assert (record["solve_s"], record["min_s"]) == (12.0, 2.0)
-    assert record["job"]["rounds"] == 3
+    assert record.round_s == (2.0, 12.0, 14.0)
+    assert (record.report.solve_s, record.report.waited) == (12.0, 0.3)
+    assert record.job.rounds == 3
     failed = run.store.record(run.cells[2].job.id)
     assert failed is not None
-    assert failed["status"] == "error(second time)"
-    assert "round_s" not in failed
+    assert failed.outcome.text == "error(second time)"
+    assert failed.round_s == ()
 
 
 def test_an_instance_is_timed_again_as_a_whole(
@@ -106,6 +109,36 @@ def test_real_children(faulty_plugin: Path, tmp_path: Path) -> None:
     solves = [line.split()[0] for line in mark.read_text().splitlines()]
     assert len(set(solves)) == 2 * (2 + 2 + 1)  # a child for each round, and none after a crash
     assert max(solves.count(pid) for pid in solves) > 3  # what is fast is repeated within a round
+
+
+def test_no_repetition_finds_what_another_has_left_in_its_problem(tmp_path: Path) -> None:
+    plugin = tmp_path / "leaver.py"
+    plugin.write_text(LEAVER)
+    problem = tmp_path / "problem.npz"
+    save_problem(problem, Problem(2, np.array([(0, 1)]), np.eye(3)[None]))
+    seen = tmp_path / "seen"
+    request = Request(str(problem), str(plugin), "leaver", {"seen": str(seen)}, 0, 1, str(tmp_path), repeat_s=0.02)
+    result = child.solve(request, child.prepare(request))
+    found = seen.read_text().split()
+    assert len(result.report.solves_s) == len(found) - 1 > 2
+    assert set(found) == {"fresh"}
+
+
+LEAVER = """
+from dataclasses import dataclass
+import numpy as np
+from bench import method
+
+@method("leaver", title="Leaver")
+@dataclass(frozen=True)
+class Leaver:
+    seen: str = ""
+    def solve(self, problem, rng):
+        with open(self.seen, "a") as file:
+            file.write("used " if "mine" in vars(problem) else "fresh ")
+        vars(problem)["mine"] = True
+        return np.tile(np.eye(3), (problem.n, 1, 1))
+"""
 
 
 def test_ordinary_and_timing_runs_do_not_share_a_folder(faulty_plugin: Path, tmp_path: Path) -> None:

@@ -50,9 +50,9 @@ def _why_no_times(stores: "list[Store]", results: "list[Results]") -> str:
         return "both have to be timing runs (run --timing)"
     machines = [
         {
-            (record["provenance"].get("cpu"), record.get("threads"))
+            (record.provenance.get("cpu"), record.limits.threads)
             for job in scored.frame["job"]
-            if (record := store.record(job)) and "provenance" in record
+            if (record := store.record(job))
         }
         for store, scored in zip(stores, results, strict=True)
     ]

@@ -34,6 +34,6 @@ def doctor(
         raise typer.Exit(1)
     store = Store.open(folder)
     jobs = store.jobs()
-    ends = [record["outcome"] if (record := store.record(job.id)) else outcome.NOT_RUN for job in jobs]
+    ends = [record.outcome.kind if (record := store.record(job.id)) else outcome.NOT_RUN for job in jobs]
     counts = ", ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
     typer.echo(f"{folder}: {len(jobs)} jobs planned ({counts})")

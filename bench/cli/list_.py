@@ -53,7 +53,7 @@ def _list_plugins(kind: str, plugins: list[Path]) -> None:
 
     found = catalog(kind, plugins)
     for info in sorted(found, key=lambda info: info.name):
-        state = f"   not installed: {info.install_hint}" if info.not_installed else ""
+        state = f"   not installed: {info.install_hint()}" if info.not_installed() else ""
         typer.echo(f"{info.name:<15} {info.summary}{state}")
         details = [selection.format_selection("defaults", info.defaults())]
         details += [f"cite {info.cite}"] if info.cite else []

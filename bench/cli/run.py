@@ -54,12 +54,6 @@ def run(
     ] = None,
     timeout: Annotated[float | None, typer.Option(metavar="S", help="Wall clock seconds of one job.")] = None,
     memory: Annotated[float | None, typer.Option(metavar="GIB", help="Resident memory of one job.")] = None,
-    budget: Annotated[
-        str | None,
-        typer.Option(
-            metavar="B", help="Threads, time and GiB of one job in one word, such as 1c-60s-4g or 4c-10m-16g."
-        ),
-    ] = None,
     protocol: ProtocolOption = None,
     align: AlignOption = Align.L1,
     timing: Annotated[
@@ -99,7 +93,6 @@ def run(
         threads=threads,
         timeout_s=timeout,
         memory_gib=memory,
-        budget=budget,
         protocol=protocol,
         rerun=rerun.value,
         timing=timing,
@@ -130,14 +123,11 @@ def _intention(planned: "Run") -> str:
 
 
 def _list_cells(planned: "Run") -> None:
-    from bench.plugins.selection import format_selection
-
     todo = {cell.job.id for cell in planned.todo}
     for cell in planned.cells:
         job = cell.job
         state = "to run" if job.id in todo else "done"
-        method = format_selection(job.method, job.parameters)
-        typer.echo(f"{state:<7} {job.dataset} {job.instance} seed {job.seed} {method}")
+        typer.echo(f"{state:<7} {job.dataset} {job.instance} seed {job.seed} {job.label}")
     for sentence in planned.experiment.missing:
         typer.echo(f"missing: {sentence}")
     if planned.todo:

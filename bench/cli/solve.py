@@ -19,8 +19,8 @@ def solve(
     plugin: PluginOption = None,
 ) -> None:
     """Solve one graph with one method and write the absolute rotations (world to camera)."""
+    from bench.core.limits import Limits
     from bench.execution.single import SingleSolver
-    from bench.execution.supervise import Limits
     from bench.formats import read_graph, rotations_writer
     from bench.plugins.catalog import catalog
 
@@ -29,9 +29,9 @@ def solve(
     write = rotations_writer(out, loaded)
     problem = loaded.problem
     typer.echo(f"{graph}: {problem.n} cameras, {problem.m} edges")
-    with SingleSolver(*chosen, Limits(timeout, memory), threads) as solver:
-        ended, report, estimate = solver.solve(problem, seed)
-    for note in (*loaded.notes, *report.get("notes", ())):
+    with SingleSolver(*chosen, Limits(timeout, memory, threads)) as solver:
+        ended, report, estimate, _ = solver.solve(problem, seed)
+    for note in (*loaded.notes, *report.notes):
         typer.echo(f"note: {note}")
     if estimate is None:
         typer.echo(f"{method}: {ended.text}", err=True)
@@ -41,7 +41,7 @@ def solve(
     if estimate.edge_weights is not None:
         said["edge_weights"] = estimate.edge_weights
     write(loaded.cameras, estimate.rotations, said)
-    typer.echo(_summary(method, report["solve_s"], residuals))
+    typer.echo(_summary(method, report.solve_s or 0.0, residuals))
     typer.echo(f"wrote {out}")
 
 

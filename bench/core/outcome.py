@@ -2,34 +2,55 @@
 
 import signal
 from dataclasses import dataclass
+from typing import Final, Literal
 
-OK = "ok"
-TIMEOUT = "timeout"
-OUT_OF_MEMORY = "out-of-memory"
-CRASHED = "crashed"
-ERROR = "error"
-INVALID_OUTPUT = "invalid-output"
-SKIPPED = "skipped"
-NOT_INSTALLED = "not-installed"
-NOT_RUN = "not-run"  # planned, no record yet
+Kind = Literal[
+    "ok",
+    "timeout",
+    "out-of-memory",
+    "crashed",
+    "error",
+    "invalid-output",
+    "skipped",
+    "not-installed",
+    "not-run",
+]
+OK: Final = "ok"
+TIMEOUT: Final = "timeout"
+OUT_OF_MEMORY: Final = "out-of-memory"
+CRASHED: Final = "crashed"
+ERROR: Final = "error"
+INVALID_OUTPUT: Final = "invalid-output"
+SKIPPED: Final = "skipped"
+NOT_INSTALLED: Final = "not-installed"
+NOT_RUN: Final = "not-run"  # planned, no record yet
 
 DETAIL_LENGTH = 300
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A word of the vocabulary, with its reason where it has one."""
+    """A word of the vocabulary, with its reason where it has one: a line of at most `DETAIL_LENGTH` characters."""
 
-    kind: str
+    kind: Kind
     detail: str = ""
+
+    def __post_init__(self) -> None:
+        """Bring the reason, which a plug-in may have written, on one line."""
+        detail = " ".join(self.detail.split())
+        if len(detail) > DETAIL_LENGTH:
+            detail = detail[: DETAIL_LENGTH - 1] + "…"
+        object.__setattr__(self, "detail", detail)
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is an estimate."""
+        return self.kind == OK
 
     @property
     def text(self) -> str:
         """``ok``, ``timeout``, ``crashed(SIGSEGV)``, ``error(message)``…"""
-        detail = " ".join(self.detail.split())
-        if len(detail) > DETAIL_LENGTH:
-            detail = detail[: DETAIL_LENGTH - 1] + "…"
-        return f"{self.kind}({detail})" if detail else self.kind
+        return f"{self.kind}({self.detail})" if self.detail else self.kind
 
 
 def crashed(exit_code: int, by_kernel: bool = False) -> Outcome:

@@ -3,7 +3,7 @@
 import dataclasses
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar
 
@@ -18,6 +18,8 @@ _PLAIN = {
     float: "a number",
     types.NoneType: "none",
 }
+
+_SEVERAL = {str: "text", int: "whole numbers", float: "numbers"}
 
 
 def read(cls: type[T], content: Mapping[str, Any], where: str) -> T:
@@ -82,6 +84,8 @@ def _value(hint: Any, value: Any, at: str) -> Any:
         return _instance(hint, value, at)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is tuple and isinstance(value, list | tuple):
+        if set(map(type, value)) <= {arguments[0]} & {str, float, int} and _fit(value):
+            return tuple(value)  # a column may have a million entries
         return tuple(_value(arguments[0], entry, f"{at}[{k}]") for k, entry in enumerate(value))
     if origin is Mapping and isinstance(value, Mapping):
         return {
@@ -96,6 +100,8 @@ def _value(hint: Any, value: Any, at: str) -> Any:
 
 def _one_of(options: tuple[Any, ...], value: Any, at: str) -> Any:
     """`value` as the first of several annotations that it fits; a complaint about a part of it is the most telling."""
+    if type(value) in _PLAIN and type(value) in options:
+        return _plain(type(value), value, at)
     complaint = None
     for option in options:
         try:
@@ -108,13 +114,18 @@ def _one_of(options: tuple[Any, ...], value: Any, at: str) -> Any:
 
 def _plain(hint: type, value: Any, at: str) -> Any:
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+    if isinstance(value, int) and not _fit([value]):
         raise InputError(f"{at} has more than 64 bits, which no number here needs")
     if hint is float and number:
         return float(value)
     if isinstance(value, hint) and (hint is not int or number):
         return value
     raise _wrong(_PLAIN[hint], value, at)
+
+
+def _fit(values: Sequence[Any]) -> bool:
+    """Whether whole numbers, if that is what these are, have at most 64 bits."""
+    return not values or not isinstance(values[0], int) or (min(values) >= -(2**63) and max(values) < 2**63)
 
 
 def _wrong(wanted: str, value: Any, at: str) -> InputError:
@@ -127,7 +138,7 @@ def _spelled(hint: Any) -> str:
     if origin is typing.Literal:
         return " or ".join(map(repr, arguments))
     if origin is tuple:
-        return f"a list of {_spelled(arguments[0])}"
+        return f"a list of {_SEVERAL.get(arguments[0], 'tables')}"
     return _PLAIN.get(hint, "a table")
 
 

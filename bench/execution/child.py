@@ -26,14 +26,16 @@ import numpy as np
 from bench.core import outcome
 from bench.core.errors import described
 from bench.core.outcome import Outcome
-from bench.core.problem import Estimate, Floats, Problem, Skipped
+from bench.core.problem import Estimate, Problem, Skipped
 from bench.core.seeds import stream
-from bench.execution.output import DISK_FULL, ESTIMATE_FILE, RESULT_FILE
+from bench.execution.given import Given
+from bench.execution.output import ESTIMATE_FILE, RESULT_FILE, Result
 from bench.execution.threads import pin_threads
-from bench.execution.validate import kept_warnings, scalars, what_is_wrong
-from bench.plugins.catalog import import_origin, infos
-from bench.plugins.declare import Info
+from bench.execution.validate import kept_warnings, reported, what_is_wrong
+from bench.plugins.catalog import method_at
+from bench.plugins.declare import Method, MethodInfo
 from bench.storage.arrays import load_problem, save_estimate
+from bench.storage.record import Report
 
 MANY = 10  # times repeat_s; a solution that takes longer is timed as it is, the first time
 
@@ -79,15 +81,16 @@ class Request:
 class Prepared:
     """What a job needs besides what it is told: the plug-in, the configured method and the problem."""
 
-    info: Info
-    method: Any
+    info: MethodInfo
+    method: Method
     problem: Problem
 
 
 def prepare(request: Request) -> Prepared:
     """Import the plug-in, configure the method and load the problem."""
-    module = import_origin(request.origin)
-    info = next(info for info in infos(module, "method") if info.name == request.method)
+    info = method_at(request.origin, request.method)
+    if info is None:
+        raise LookupError(f"{request.origin} has no method '{request.method}'")
     return Prepared(info, info.configure(request.parameters), _loaded(request.problem))
 
 
@@ -105,67 +108,63 @@ def run(request: Request, prepared: Prepared | None = None) -> None:
     prepared
         What `prepare` gave for this request, where that was called before.
     """
-    result: dict[str, Any] = {}
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            ended = solve(request, prepared or prepare(request), result)
-        result["warnings"] = kept_warnings(caught)
+            result = solve(request, prepared or prepare(request))
+        warned = kept_warnings(caught)
+        result = dataclasses.replace(result, report=dataclasses.replace(result.report, warnings=warned))
     except Skipped as skip:
-        ended = Outcome(outcome.SKIPPED, str(skip))
+        result = Result(Outcome(outcome.SKIPPED, str(skip)), Report())
     except MemoryError as error:
-        ended = Outcome(outcome.OUT_OF_MEMORY, str(error))
+        result = Result(Outcome(outcome.OUT_OF_MEMORY, str(error)), Report())
     except Exception as error:
         traceback.print_exc()
-        ended = Outcome(outcome.ERROR, described(error))
-    result |= {"kind": ended.kind, "detail": ended.detail}
+        result = Result(Outcome(outcome.ERROR, described(error)), Report())
     temporary = Path(request.folder, RESULT_FILE + ".part")
-    temporary.write_text(json.dumps(result), encoding="utf-8")
+    temporary.write_text(json.dumps(dataclasses.asdict(result)), encoding="utf-8")
     temporary.replace(Path(request.folder, RESULT_FILE))
 
 
-def solve(request: Request, prepared: Prepared, result: dict[str, Any]) -> Outcome:
-    """Run the job, write its estimate and fill in `result`; whatever the method raises comes through."""
+def solve(request: Request, prepared: Prepared) -> Result:
+    """Run the job and write its estimate; whatever the method raises comes through."""
     info, method, problem = prepared.info, prepared.method, prepared.problem
     limit = info.fact("max_cameras", method)
     if limit is not None and problem.n > limit:
         raise Skipped(f"{problem.n} cameras, and {info.name} is meant for at most {limit}")
-    for name in info.requires:
+    for name in info.requires_of(request.parameters):
         importlib.import_module(name)
-    result["threads"] = pin_threads(request.threads)
-    result["core"] = _pin_core(request.core)
+    report = Report(threads=pin_threads(request.threads), core=_pin_core(request.core))
     if request.warm_up and hasattr(method, "warm_up"):
         method.warm_up()
 
-    cameras = np.flatnonzero(problem.components == 0)
-    connected = len(cameras) == problem.n
-    solved, kept = (problem, np.ones(problem.m, bool)) if connected else problem.subgraph(cameras)
-    pristine = copy.copy(solved)  # what a solution caches in its problem, the next one must not find
+    given = Given.of(problem)
+    pristine = copy.copy(given.problem)  # what a solution caches in its problem, the next one must not find
     memory = _PeakMemory()
     processor = time.process_time()
     process = os.getpid()
-    estimate, elapsed = _timed(method, solved, stream(request.seed, "method", info.name))
+    estimate, elapsed = _timed(method, given.problem, stream(request.seed, "method", info.name))
     if os.getpid() != process:
         os._exit(0)  # the method forked, and did not keep the other from returning here
     processor = time.process_time() - processor
-    result["peak_mib"] = memory.peak_mib()
-    result["solve_s"] = elapsed
+    report = dataclasses.replace(report, peak_mib=memory.peak_mib(), solve_s=elapsed)
     wrong = what_is_wrong(pristine, estimate, elapsed)
     if wrong:
-        return Outcome(outcome.INVALID_OUTPUT, wrong)
-    result |= {"solve_s": elapsed - float(estimate.conversion_s), "conversion_s": float(estimate.conversion_s)}
-    if not connected:
-        estimate = _lifted(estimate, problem, cameras, kept)
+        return Result(Outcome(outcome.INVALID_OUTPUT, wrong), report)
+    conversion_s = float(estimate.conversion_s)
+    solve_s = elapsed - conversion_s
+    report = dataclasses.replace(report, solve_s=solve_s, conversion_s=conversion_s)
+    estimate = given.restored(estimate)
     if request.repeat_s:
-        solves_s, waited = [result["solve_s"]], 1 - processor / elapsed
+        solves_s, waited = [solve_s], 1 - processor / elapsed
         if elapsed < MANY * request.repeat_s:
             solves_s, waited = _repeated(method, pristine, request, info.name)
-        result |= {"solves_s": solves_s, "waited": max(0.0, waited)}
-    result |= scalars(estimate)
-    return _saved(estimate, Path(request.folder, ESTIMATE_FILE), result)
+        report = dataclasses.replace(report, solves_s=tuple(solves_s), waited=max(0.0, waited))
+    report = reported(report, estimate)
+    return _saved(estimate, Path(request.folder, ESTIMATE_FILE), report)
 
 
-def _saved(estimate: Estimate, path: Path, result: dict[str, Any]) -> Outcome:
+def _saved(estimate: Estimate, path: Path, report: Report) -> Result:
     """Keep the estimate; a full disk is told as such, since it is no fault of the method."""
     try:
         save_estimate(path, estimate)
@@ -173,12 +172,11 @@ def _saved(estimate: Estimate, path: Path, result: dict[str, Any]) -> Outcome:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
         path.unlink(missing_ok=True)
-        result[DISK_FULL] = error.strerror
-        return Outcome(outcome.ERROR, str(error))
-    return Outcome(outcome.OK)
+        return Result(Outcome(outcome.ERROR, str(error)), report, disk_full=error.strerror or str(error))
+    return Result(Outcome(outcome.OK), report)
 
 
-def _timed(method: Any, problem: Problem, rng: np.random.Generator) -> tuple[Estimate, float]:
+def _timed(method: Method, problem: Problem, rng: np.random.Generator) -> tuple[Estimate, float]:
     if hasattr(os, "sched_yield"):
         os.sched_yield()  # whoever waits for this core has his turn now, and not in the middle of a short solution
     start = time.perf_counter()
@@ -187,7 +185,7 @@ def _timed(method: Any, problem: Problem, rng: np.random.Generator) -> tuple[Est
     return answer if isinstance(answer, Estimate) else Estimate(answer), elapsed
 
 
-def _repeated(method: Any, problem: Problem, request: Request, name: str) -> tuple[list[float], float]:
+def _repeated(method: Method, problem: Problem, request: Request, name: str) -> tuple[list[float], float]:
     """Solve seconds of as many solutions as fit into `repeat_s`, at least one, and the share of time off the core.
 
     The solution before these has filled caches and done what libraries put off to their first call.
@@ -201,27 +199,6 @@ def _repeated(method: Any, problem: Problem, request: Request, name: str) -> tup
         total += elapsed
         solves_s.append(elapsed - estimate.conversion_s)
     return solves_s, 1 - processor / total
-
-
-def _lifted(estimate: Estimate, problem: Problem, cameras: Any, kept: Any) -> Estimate:
-    """Put an estimate of the largest component into the whole graph, NaN elsewhere."""
-
-    def spread(values: Floats, size: int, where: Any) -> Floats:
-        out = np.full((size, *values.shape[1:]), np.nan)
-        out[where] = values
-        return out
-
-    note = f"disconnected graph: solved on its largest component, {len(cameras)} of {problem.n} cameras"
-    weights = estimate.edge_weights
-    return dataclasses.replace(
-        estimate,
-        rotations=spread(estimate.rotations, problem.n, cameras),
-        edge_weights=None if weights is None else spread(np.asarray(weights), problem.m, kept),
-        checkpoints=tuple(
-            dataclasses.replace(c, rotations=spread(c.rotations, problem.n, cameras)) for c in estimate.checkpoints
-        ),
-        notes=(*estimate.notes, note),
-    )
 
 
 def _pin_core(core: int | None) -> int | None:

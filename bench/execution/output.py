@@ -1,87 +1,78 @@
-"""Read what a child leaves, which may be anything: it is checked before it counts."""
+"""What a child leaves, which may be anything: it is checked before it counts."""
 
 import json
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from bench.core import outcome
+from bench.core import outcome, typed
+from bench.core.errors import InputError
 from bench.core.outcome import Outcome
+from bench.storage.record import Report
 
 ESTIMATE_FILE = "estimate.npz"
 RESULT_FILE = "result.json"
-DISK_FULL = "disk_full"  # in a result: why the estimate could not be written
 LARGEST_RESULT = 2**24  # bytes; the scalars of a few hundred thousand checkpoints fit into it
 OF_CHILDREN = (outcome.OK, outcome.SKIPPED, outcome.ERROR, outcome.OUT_OF_MEMORY, outcome.INVALID_OUTPUT)
 
 
-OF_THE_HARNESS = {"job", "outcome", "status", "finished", "limits", "versions", "provenance", "schema"}
-REQUIRED = {"solve_s", "peak_mib", "checkpoints"}
-_NUMBER, _NOTHING = (int, float), type(None)
-TYPES: dict[str, tuple[type, ...]] = {
-    **dict.fromkeys(("solve_s", "conversion_s", "peak_mib", "waited"), _NUMBER),
-    **dict.fromkeys(("cost", "certificate"), (*_NUMBER, _NOTHING)),
-    **dict.fromkeys(("core", "iterations"), (int, _NOTHING)),
-    **dict.fromkeys(("notes", "warnings", "checkpoints", "solves_s"), (list,)),
-    "threads": (int,),
-    "stop_reason": (str,),
-}
+@dataclass(frozen=True)
+class Result:
+    """How a child ended, as it says itself.
+
+    Parameters
+    ----------
+    outcome, report
+        What becomes part of the record.
+    disk_full
+        Why the estimate could not be written, where the disk was at fault.
+    """
+
+    outcome: Outcome
+    report: Report
+    disk_full: str = ""
 
 
 class UnusableError(ValueError):
     """The child left something that is not a result; the message says what."""
 
 
-def read_output(folder: Path) -> tuple[Outcome, dict[str, Any]] | None:
-    """Outcome and scalars that the child has left in its folder; None where it left none.
+def read_output(folder: Path) -> Result | None:
+    """What the child has left in its folder; None where it left nothing.
 
     Raises
     ------
     UnusableError
-        Where they are malformed, or the estimate that they promise is.
+        Where that is malformed, or the estimate that it promises is.
     """
     try:
-        ended, report = _result(folder / RESULT_FILE)
+        result = _result(folder / RESULT_FILE)
     except FileNotFoundError:
         return None
-    if ended.kind == outcome.OK:
-        _check_estimate(folder / ESTIMATE_FILE, len(report["checkpoints"]))
-    return ended, report
+    if result.outcome.ok:
+        _check_estimate(folder / ESTIMATE_FILE, len(result.report.checkpoints))
+    return result
 
 
-def _result(path: Path) -> tuple[Outcome, dict[str, Any]]:
+def _result(path: Path) -> Result:
     size = path.stat().st_size
     if size > LARGEST_RESULT:
         raise UnusableError(f"{path.name} has {size} bytes")
     try:
-        report = json.loads(path.read_bytes())
+        content = json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:
         raise UnusableError(f"{path.name} is not JSON ({error})") from error
-    if not isinstance(report, dict) or report.get("kind") not in OF_CHILDREN:
-        raise UnusableError(f"{path.name} tells no outcome")
-    if not isinstance(detail := report.pop("detail", None), str):
-        raise UnusableError(f"{path.name} tells no reason of its outcome")
-    ended = Outcome(report.pop("kind"), detail)
-    if forged := OF_THE_HARNESS & report.keys():
-        raise UnusableError(f"{path.name} tells '{min(forged)}', which is not for a child to tell")
-    missing = REQUIRED - report.keys() if ended.kind == outcome.OK else ()
-    if missing:
-        raise UnusableError(f"{path.name} does not tell {' and '.join(sorted(missing))}")
-    for name in report.keys() & TYPES.keys():
-        if not isinstance(report[name], TYPES[name]) or isinstance(report[name], bool):
-            raise UnusableError(f"{path.name}: '{name}' is a {type(report[name]).__name__}")
-    _check_lists(path, report)
-    return ended, report
-
-
-def _check_lists(path: Path, report: dict[str, Any]) -> None:
-    if not all(isinstance(text, str) for name in ("notes", "warnings") for text in report.get(name, ())):
-        raise UnusableError(f"{path.name}: notes and warnings are sentences")
-    for checkpoint in report.get("checkpoints", ()):
-        if not isinstance(checkpoint, dict) or checkpoint.keys() != {"iteration", "seconds", "diagnostics"}:
-            raise UnusableError(f"{path.name}: a checkpoint is not one")
+    try:
+        result = typed.read(Result, content, path.name)
+    except InputError as error:
+        raise UnusableError(str(error)) from error
+    if result.outcome.kind not in OF_CHILDREN:
+        raise UnusableError(f"{path.name}: '{result.outcome.kind}' is not for a child to tell")
+    if result.outcome.ok and (result.report.solve_s is None or result.report.peak_mib is None):
+        raise UnusableError(f"{path.name} does not tell what the solution took")
+    return result
 
 
 def _check_estimate(path: Path, checkpoints: int) -> None:

@@ -7,13 +7,12 @@ import sys
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 from bench import __version__
 
 
 @cache
-def of_this_run() -> dict[str, Any]:
+def of_this_run() -> dict[str, str]:
     """Facts that every record of one run shares."""
     return {
         "bench": __version__,

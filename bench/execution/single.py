@@ -3,22 +3,31 @@
 import tempfile
 import threading
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from bench.core import outcome
+from bench.core.limits import Limits
 from bench.core.outcome import Outcome
 from bench.core.problem import Estimate, Problem
 from bench.execution.child import Request
-from bench.execution.job import execute
+from bench.execution.execute import Ended, execute
 from bench.execution.launch import Launcher
 from bench.execution.output import ESTIMATE_FILE
-from bench.execution.supervise import Limits
-from bench.plugins.declare import Info
+from bench.plugins.declare import MethodInfo
 from bench.storage.arrays import load_estimate, save_problem
+from bench.storage.record import Report
 
-Answer = tuple[Outcome, dict[str, Any], Estimate | None]
+
+class Answer(NamedTuple):
+    """How a solution ended, what its child told, the estimate where the outcome is ``ok``, and what was printed."""
+
+    outcome: Outcome
+    report: Report
+    estimate: Estimate | None
+    log: str = ""
 
 
 class SingleSolver:
@@ -32,16 +41,13 @@ class SingleSolver:
         The method and the parameters given.
     limits
         Of each problem.
-    threads
-        How many threads the numerical libraries may use.
     """
 
-    def __init__(self, info: Info, parameters: Mapping[str, Any], limits: Limits, threads: int = 1) -> None:
+    def __init__(self, info: MethodInfo, parameters: Mapping[str, Any], limits: Limits) -> None:
         self.info = info
         self.parameters = dict(parameters)
         self.limits = limits
-        self.threads = threads
-        self.launcher = Launcher(threads)
+        self.launcher = Launcher(limits.threads)
         self._warm_up = True
 
     def __enter__(self) -> Self:
@@ -53,23 +59,29 @@ class SingleSolver:
         self.launcher.close()
 
     def solve(self, problem: Problem, seed: int = 0) -> Answer:
-        """Outcome, the child's report and, where the outcome is ``ok``, the estimate."""
-        if self.info.not_installed:
-            return Outcome(outcome.NOT_INSTALLED, self.info.install_hint), {}, None
+        """Solve one problem."""
+        if self.info.not_installed(self.parameters):
+            hint = self.info.install_hint(self.parameters)
+            return Answer(Outcome(outcome.NOT_INSTALLED, hint), Report(), None)
         with tempfile.TemporaryDirectory(prefix="rotsync-") as name:
-            folder = Path(name)
-            save_problem(folder / "problem.npz", problem)
-            request = Request(
-                problem=str(folder / "problem.npz"),
-                origin=self.info.origin,
-                method=self.info.name,
-                parameters=self.parameters,
-                seed=seed,
-                threads=self.threads,
-                folder=name,
-                warm_up=self._warm_up,
-            )
+            request = request_in(Path(name), self.info, self.parameters, problem, seed, self.limits.threads)
+            request = replace(request, warm_up=self._warm_up)
             self._warm_up = False
-            ended, report = execute(request, self.info.requires, self.launcher, self.limits, threading.Event())
-            ok = ended.kind == outcome.OK
-            return ended, report, load_estimate(folder / ESTIMATE_FILE, report) if ok else None
+            requires = self.info.requires_of(self.parameters)
+            ended = execute(request, requires, self.launcher, self.limits, threading.Event())
+            return answer(ended, Path(name))
+
+
+def request_in(
+    folder: Path, info: MethodInfo, parameters: Mapping[str, Any], problem: Problem, seed: int, threads: int
+) -> Request:
+    """A request whose problem lies in the folder that its results go to."""
+    path = folder / "problem.npz"
+    save_problem(path, problem)
+    return Request(str(path), info.origin, info.name, dict(parameters), seed, threads, str(folder))
+
+
+def answer(ended: Ended, folder: Path) -> Answer:
+    """The answer of a request that was run, with its estimate from the folder of its results."""
+    estimate = load_estimate(folder / ESTIMATE_FILE, ended.report) if ended.outcome.ok else None
+    return Answer(ended.outcome, ended.report, estimate, ended.log)

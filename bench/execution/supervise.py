@@ -2,34 +2,15 @@
 
 import threading
 import time
-from dataclasses import dataclass
 
 from bench.core import outcome
+from bench.core.limits import Limits
 from bench.core.outcome import Outcome
 from bench.execution import processes
 from bench.execution.launch import Child
 
 SHORTEST_S, LONGEST_S = 0.01, 0.1  # between two looks at a child
 FASTEST_GIB_S = 4.0  # how fast a process may be thought to fill memory
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a job may use.
-
-    Parameters
-    ----------
-    seconds
-        Wall clock.
-    memory_gib
-        Resident memory of the child and its descendants.
-    budget
-        The name of these limits, where they were given by one; see `bench.suite.budget`.
-    """
-
-    seconds: float
-    memory_gib: float
-    budget: str = ""
 
 
 class Interrupted(Exception):  # noqa: N818 - the user's wish, not an error

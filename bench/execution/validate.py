@@ -7,6 +7,7 @@ import itertools
 import math
 import warnings
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from numbers import Integral, Real
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from bench.core.errors import described
 from bench.core.problem import ROTATION_TOLERANCE, Checkpoint, Estimate, Problem
+from bench.storage.record import Moment, Report
 
 MOST_TEXT = 100_000  # characters of all notes, and of the stop reason
 MOST_CHECKPOINTS = 100_000
@@ -37,29 +39,30 @@ def what_is_wrong(problem: Problem, estimate: Any, elapsed: float) -> str:
     return next(filter(None, _complaints(problem, estimate, elapsed)), "")
 
 
-def scalars(estimate: Estimate) -> dict[str, Any]:
-    """What a record keeps of a valid estimate besides its arrays, as JSON can hold it."""
-    return {
-        "iterations": None if estimate.iterations is None else int(estimate.iterations),
-        "stop_reason": str(estimate.stop_reason),
-        "cost": None if estimate.cost is None else float(estimate.cost),
-        "certificate": None if estimate.certificate is None else float(estimate.certificate),
-        "notes": [str(note) for note in estimate.notes],
-        "checkpoints": [
-            {
-                "iteration": int(c.iteration),
-                "seconds": float(c.seconds),
-                "diagnostics": {str(name): float(value) for name, value in c.diagnostics.items()},
-            }
+def reported(report: Report, estimate: Estimate) -> Report:
+    """The report with what a valid estimate holds besides its arrays, in types that JSON has."""
+    return replace(
+        report,
+        iterations=None if estimate.iterations is None else int(estimate.iterations),
+        stop_reason=str(estimate.stop_reason),
+        cost=None if estimate.cost is None else float(estimate.cost),
+        certificate=None if estimate.certificate is None else float(estimate.certificate),
+        notes=tuple(map(str, estimate.notes)),
+        checkpoints=tuple(
+            Moment(
+                int(c.iteration),
+                float(c.seconds),
+                {str(name): float(value) for name, value in c.diagnostics.items()},
+            )
             for c in estimate.checkpoints
-        ],
-    }
+        ),
+    )
 
 
-def kept_warnings(caught: Iterable[warnings.WarningMessage]) -> list[str]:
+def kept_warnings(caught: Iterable[warnings.WarningMessage]) -> tuple[str, ...]:
     """Some of the different warnings of a solution, each on a line."""
     different = {described(w.message): None for w in itertools.islice(caught, 10_000) if isinstance(w.message, Warning)}
-    return sorted(different)[:MOST_WARNINGS]
+    return tuple(sorted(different)[:MOST_WARNINGS])
 
 
 def _complaints(problem: Problem, estimate: Estimate, elapsed: float) -> Iterable[str]:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.core import outcome
 from bench.core.errors import InputError
 from bench.core.problem import Floats, Instance
 from bench.maps.adaptive import Bools, Counts, Sample, Tally, every_sample, next_samples
@@ -214,9 +213,10 @@ class PhaseMap:
         }
         found = {}
         for cell in self.run.cells:
-            if cell.method.not_installed:
-                raise InputError(f"method '{cell.method.name}' is not installed: {cell.method.install_hint}")
             job = cell.job
+            if cell.method.not_installed(job.parameters):
+                hint = cell.method.install_hint(job.parameters)
+                raise InputError(f"method '{job.label}' is not installed: {hint}")
             method = selection.format_selection(job.method, dict(job.parameters))
             found[method, (*places[job.dataset], job.seed)] = cell
         methods = {method for method, _ in found}
@@ -229,7 +229,7 @@ class PhaseMap:
         store = self.run.store
         record = store.record(cell.job.id)
         told = _Sampled(np.inf, False, False)
-        if record is not None and record["outcome"] == outcome.OK:
+        if record is not None and record.outcome.ok:
             instance = self._instance(cell.job.instance_key)
             if instance.truth is None:
                 raise InputError(f"dataset '{self.dataset.name}' has no truth to tell success by")

@@ -14,26 +14,29 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Literal, TypeVar, overload
 
 from bench.core.errors import InputError, described, shown, suggestion
 from bench.plugins import selection
 from bench.plugins.configure import parameters_of
-from bench.plugins.declare import INFO, Info
+from bench.plugins.declare import INFO, DatasetInfo, Info, MethodInfo
 
 PACKAGES = {"method": "bench.methods", "dataset": "bench.datasets"}
 ENTRY_POINTS = {"method": "rotsync_bench.methods", "dataset": "rotsync_bench.datasets"}
 
 
+Declared = TypeVar("Declared", bound=Info)
+
+
 @dataclass(frozen=True)
-class Catalog:
+class Catalog(Generic[Declared]):
     """Every plug-in of one kind, and the modules that could not be imported."""
 
     kind: str
-    entries: Mapping[str, Info]
+    entries: Mapping[str, Declared]
     broken: Mapping[str, str]
 
-    def __getitem__(self, name: str) -> Info:
+    def __getitem__(self, name: str) -> Declared:
         if name in self.entries:
             return self.entries[name]
         for origin, why in self.broken.items():
@@ -41,12 +44,12 @@ class Catalog:
                 raise InputError(f"{self.kind} '{name}' is broken: {why}")
         raise InputError(f"there is no {self.kind} {shown(name)}{suggestion(name, self.entries)}")
 
-    def __iter__(self) -> Iterator[Info]:
+    def __iter__(self) -> Iterator[Declared]:
         return iter(self.entries.values())
 
-    def select(self, texts: Iterable[str]) -> list[tuple[Info, dict[str, Any]]]:
+    def select(self, texts: Iterable[str]) -> list[tuple[Declared, dict[str, Any]]]:
         """Resolve selections to entries with the parameters given, one pair for each combination, none twice."""
-        chosen: dict[str, tuple[Info, dict[str, Any]]] = {}
+        chosen: dict[str, tuple[Declared, dict[str, Any]]] = {}
         for text in texts:
             parsed = selection.parse(text)
             info = self[parsed.name]
@@ -56,7 +59,7 @@ class Catalog:
                 chosen.setdefault(selection.format_selection(info.name, parameters_of(configured)), (info, given))
         return list(chosen.values())
 
-    def one(self, text: str) -> tuple[Info, dict[str, Any]]:
+    def one(self, text: str) -> tuple[Declared, dict[str, Any]]:
         """Resolve a selection that stands for one configuration; `InputError` where it stands for several."""
         chosen = self.select([text])
         if len(chosen) != 1:
@@ -64,7 +67,13 @@ class Catalog:
         return chosen[0]
 
 
-def catalog(kind: str, plugins: Sequence[str | Path] = ()) -> Catalog:
+@overload
+def catalog(kind: Literal["method"], plugins: Sequence[str | Path] = ()) -> Catalog[MethodInfo]: ...
+@overload
+def catalog(kind: Literal["dataset"], plugins: Sequence[str | Path] = ()) -> Catalog[DatasetInfo]: ...
+@overload
+def catalog(kind: str, plugins: Sequence[str | Path] = ()) -> Catalog[Info]: ...
+def catalog(kind: str, plugins: Sequence[str | Path] = ()) -> Catalog[Any]:
     """Find the plug-ins of one kind ("method" or "dataset").
 
     Raises
@@ -75,7 +84,12 @@ def catalog(kind: str, plugins: Sequence[str | Path] = ()) -> Catalog:
     return scan(kind, [*_builtin(kind), *_entry_points(kind), *(_plugin_path(p) for p in plugins)])
 
 
-def scan(kind: str, origins: Iterable[str]) -> Catalog:
+def default_method() -> str:
+    """The method that solves where none is named; which one that is, the folder of methods says."""
+    return str(importlib.import_module(PACKAGES["method"]).DEFAULT)
+
+
+def scan(kind: str, origins: Iterable[str]) -> Catalog[Any]:
     """Import these modules and files, and list what they declare; `InputError` on two of one name."""
     entries: dict[str, Info] = {}
     broken: dict[str, str] = {}
@@ -140,3 +154,9 @@ def infos(module: types.ModuleType, kind: str) -> list[Info]:
     ]
     infos = [cls.__dict__[INFO] for cls in classes if INFO in cls.__dict__]
     return [info for info in infos if info.kind == kind]
+
+
+def method_at(origin: str, name: str) -> MethodInfo | None:
+    """The method of a name that a module or file declares; what its import raises comes through."""
+    found = (info for info in infos(import_origin(origin), "method") if isinstance(info, MethodInfo))
+    return next((info for info in found if info.name == name), None)

@@ -4,10 +4,13 @@ import dataclasses
 import types
 import typing
 from collections.abc import Mapping
-from typing import Any
+from functools import cache
+from typing import Any, TypeVar, cast
 
 from bench.core.errors import InputError, shown, suggestion
 from bench.plugins import selection
+
+T = TypeVar("T")
 
 _RANGE = "range"
 
@@ -31,7 +34,7 @@ def parameter(
     return dataclasses.field(default=default, metadata={_RANGE: {k: v for k, v in bounds.items() if v is not None}})
 
 
-def configured(cls: type, parameters: Mapping[str, Any], what: str) -> Any:
+def configured(cls: type[T], parameters: Mapping[str, Any], what: str) -> T:
     """Make an object of a plug-in's class; `what` names it in messages.
 
     Raises
@@ -39,8 +42,8 @@ def configured(cls: type, parameters: Mapping[str, Any], what: str) -> Any:
     InputError
         On an unknown parameter or a value of the wrong type or range.
     """
-    hints = typing.get_type_hints(cls)
-    fields = {f.name: f for f in dataclasses.fields(cls)}
+    hints = _hints(cast(Any, cls))
+    fields = {f.name: f for f in dataclasses.fields(cast(Any, cls))}
     values = {}
     for key, value in parameters.items():
         if key not in fields:
@@ -51,6 +54,11 @@ def configured(cls: type, parameters: Mapping[str, Any], what: str) -> Any:
         return cls(**values)
     except ValueError as error:
         raise InputError(f"{what}: {error}") from error
+
+
+@cache
+def _hints(cls: Any) -> Mapping[str, Any]:
+    return typing.get_type_hints(cls)
 
 
 def parameters_of(configured: Any) -> dict[str, Any]:

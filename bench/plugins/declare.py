@@ -7,16 +7,20 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from types import MappingProxyType
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 
+from bench.core.errors import InputError
 from bench.core.problem import Estimate, Floats, Instance, Problem
 from bench.core.program import program
 from bench.plugins.configure import configured, default_of
 from bench.plugins.source_hash import hash_of_module
 
 INFO = "__rotsync_info__"
+_DEFAULTS: Mapping[str, Any] = MappingProxyType({})
+_WANTS_PACKAGES = "requires must be a tuple of top-level packages, such as ('numpy',)"
 _NAME = re.compile(r"[^\s\[\],='\"]+")
 
 T = TypeVar("T", bound=type)
@@ -88,15 +92,20 @@ class Info:
         """First line of the docstring."""
         return (self.cls.__doc__ or "").strip().split("\n", 1)[0]
 
-    @property
-    def not_installed(self) -> tuple[str, ...]:
-        """Required packages that are missing, found without importing them."""
-        return tuple(name for name in self.requires if importlib.util.find_spec(name) is None)
+    def requires_of(self, parameters: Mapping[str, Any]) -> tuple[str, ...]:
+        """Packages that it needs as configured: its attribute `requires`, or what is declared."""
+        required = getattr(self.configure(parameters), "requires", self.requires)
+        if not _are_packages(required):
+            raise InputError(f"{self.kind} '{self.name}': {_WANTS_PACKAGES}")
+        return tuple(required)
 
-    @property
-    def install_hint(self) -> str:
+    def not_installed(self, parameters: Mapping[str, Any] = _DEFAULTS) -> tuple[str, ...]:
+        """Packages that are missing for a configuration, found without importing them."""
+        return tuple(name for name in self.requires_of(parameters) if importlib.util.find_spec(name) is None)
+
+    def install_hint(self, parameters: Mapping[str, Any] = _DEFAULTS) -> str:
         """The command that installs what is missing."""
-        return self.facts.get("install") or f"python -m pip install {' '.join(self.not_installed)}"
+        return self.facts.get("install") or f"python -m pip install {' '.join(self.not_installed(parameters))}"
 
     @property
     def source_hash(self) -> str:
@@ -121,6 +130,27 @@ class Info:
             On an unknown parameter or a value of the wrong type or range.
         """
         return configured(self.cls, parameters, f"{self.kind} '{self.name}'")
+
+
+@dataclass(frozen=True)
+class MethodInfo(Info):
+    """What is known of a method."""
+
+    def configure(self, parameters: Mapping[str, Any]) -> Method:
+        """Make the configured method; raises as `Info.configure`."""
+        return cast(Method, super().configure(parameters))
+
+
+@dataclass(frozen=True)
+class DatasetInfo(Info):
+    """What is known of a dataset."""
+
+    def configure(self, parameters: Mapping[str, Any]) -> Dataset:
+        """Make the configured dataset; raises as `Info.configure`."""
+        return cast(Dataset, super().configure(parameters))
+
+
+INFOS: dict[str, type[Info]] = {"method": MethodInfo, "dataset": DatasetInfo}
 
 
 def method(
@@ -161,7 +191,8 @@ def method(
         How far relabelling cameras, permuting or reversing edges and turning frames may move its answer to a small
         noisy problem; None promises nothing.
 
-    Where a fact depends on the parameters, an attribute of its name overrides what is declared (see `Info.fact`).
+    Where a fact or what is required depends on the parameters, an attribute of its name overrides what is declared
+    (see `Info.fact` and `Info.requires_of`).
     """
     facts = {
         "install": install,
@@ -195,8 +226,8 @@ def _declare(
             raise TypeError(f"{kind} {name!r}: its name must be one word without quotes and any of [ ] , =")
         if not all(isinstance(text, str) for text in (title, cite)):
             raise TypeError(f"{kind} '{name}': its title and cite must be text")
-        if not isinstance(requires, tuple) or not all(isinstance(r, str) and r.isidentifier() for r in requires):
-            raise TypeError(f"{kind} '{name}': requires must be a tuple of top-level packages, such as ('numpy',)")
+        if not _are_packages(requires):
+            raise TypeError(f"{kind} '{name}': {_WANTS_PACKAGES}")
         if not dataclasses.is_dataclass(cls):
             raise TypeError(f"{kind} '{name}': put @dataclass(frozen=True) below the @{kind} decorator")
         if not callable(getattr(cls, verb, None)):
@@ -204,7 +235,11 @@ def _declare(
         for f in dataclasses.fields(cls):
             if default_of(f) is dataclasses.MISSING:
                 raise TypeError(f"{kind} '{name}': parameter '{f.name}' needs a default")
-        setattr(cls, INFO, Info(kind, name, title, cite, requires, cls, facts=facts))
+        setattr(cls, INFO, INFOS[kind](kind, name, title, cite, requires, cls, facts=facts))
         return cls
 
     return register
+
+
+def _are_packages(requires: object) -> bool:
+    return isinstance(requires, tuple) and all(isinstance(name, str) and name.isidentifier() for name in requires)

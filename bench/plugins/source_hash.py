@@ -8,6 +8,7 @@ which decides what rotations and problems are.
 import ast
 import hashlib
 import importlib.util
+import threading
 import types
 from collections.abc import Iterator
 from functools import lru_cache
@@ -16,6 +17,7 @@ from pathlib import Path
 import bench
 
 _VOCABULARY = "bench.core"
+_PARSING = threading.Lock()  # two threads that make syntax trees can break Python 3.11 (CPython issue 106905)
 _BUILT_IN = ("bench.methods", "bench.datasets")
 
 
@@ -72,7 +74,9 @@ def _imports(module: str, file: Path, _modified: int) -> tuple[str, ...]:
     """Every dotted name that a file imports, as far as it may be a module."""
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     names: dict[str, None] = {}
-    for node in ast.walk(ast.parse(file.read_bytes())):
+    with _PARSING:
+        tree = ast.parse(file.read_bytes())
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names |= dict.fromkeys(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

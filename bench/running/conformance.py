@@ -11,10 +11,10 @@ import numpy as np
 
 from bench.core import outcome, so3
 from bench.core.errors import InputError
+from bench.core.limits import Limits
 from bench.core.problem import Floats, Problem, oriented
 from bench.execution.single import Answer, SingleSolver
-from bench.execution.supervise import Limits
-from bench.plugins.declare import Info
+from bench.plugins.declare import MethodInfo
 from bench.plugins.references import cite_keys, references
 
 LIMITS = Limits(seconds=60, memory_gib=4)
@@ -39,7 +39,7 @@ class Finding:
     detail: str = ""
 
 
-def check_method(info: Info, parameters: dict[str, Any]) -> Iterator[Finding]:
+def check_method(info: MethodInfo, parameters: dict[str, Any]) -> Iterator[Finding]:
     """Run every check on a configured method, yielding each finding as it is made."""
     with SingleSolver(info, parameters, LIMITS) as solver:
         kit = _Kit(info, solver)
@@ -59,7 +59,7 @@ def check_method(info: Info, parameters: dict[str, Any]) -> Iterator[Finding]:
 class _Kit:
     """The method under test, and how closely it promises to keep what is checked."""
 
-    info: Info
+    info: MethodInfo
     solver: SingleSolver
 
     def promised(self, fact: str) -> Any:
@@ -86,12 +86,11 @@ class _Kit:
             return self._rotations(solver.solve(problem, seed))
 
     def _rotations(self, answer: Answer) -> Floats:
-        ended, report, estimate = answer
-        if ended.kind == outcome.NOT_INSTALLED:
-            raise NotApplicable(ended.text)
-        if estimate is None:
-            raise Failed(f"{ended.text} {report.get('log', '').strip()[-300:]}".strip())
-        return estimate.rotations
+        if answer.outcome.kind == outcome.NOT_INSTALLED:
+            raise NotApplicable(answer.outcome.text)
+        if answer.estimate is None:
+            raise Failed(f"{answer.outcome.text} {answer.log.strip()[-300:]}".strip())
+        return answer.estimate.rotations
 
     def recovers(self, problem: Problem, truth: Floats) -> None:
         """Fail where the estimate is further from the truth than promised."""

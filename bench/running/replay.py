@@ -1,26 +1,23 @@
 """Repeat one job from its record alone, and say what is no longer as it was."""
 
-import json
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from bench.core import outcome, so3
+from bench.core import so3
 from bench.core.errors import InputError
 from bench.core.outcome import Outcome
 from bench.core.problem import Estimate, Floats, Problem
 from bench.execution import child, provenance
-from bench.execution.output import ESTIMATE_FILE
-from bench.execution.single import Answer, SingleSolver
-from bench.execution.supervise import Limits
+from bench.execution.execute import Ended
+from bench.execution.single import Answer, SingleSolver, answer, request_in
 from bench.plugins.catalog import catalog
-from bench.plugins.declare import Info, Missing, Source
-from bench.storage.arrays import load_estimate, save_problem
-from bench.storage.store import Store
+from bench.plugins.declare import MethodInfo, Missing, Source
+from bench.storage.record import Record
+from bench.storage.store import Store, read_json
 from bench.suite.experiment import instance_key
 from bench.suite.plan import Job
 
@@ -31,54 +28,40 @@ class Repetition:
 
     Parameters
     ----------
-    job, record
+    record
         What was run, and all that is known of it.
     method, problem
         What will be run, on what.
-    limits, threads
-        Those of the record.
     stored
         The estimate of then, where the record lies in the folder of its run.
     differences
         A sentence for everything that is no longer as it was.
     """
 
-    job: Job
-    record: Mapping[str, Any]
-    method: Info
+    record: Record
+    method: MethodInfo
     problem: Problem
-    limits: Limits
-    threads: int
     stored: Estimate | None
     differences: tuple[str, ...]
 
     def supervised(self) -> Answer:
         """Run it in a child process, within the limits of the record."""
-        with SingleSolver(self.method, self.job.parameters, self.limits, self.threads) as solver:
-            return solver.solve(self.problem, self.job.seed)
+        job = self.record.job
+        with SingleSolver(self.method, job.parameters, self.record.limits) as solver:
+            return solver.solve(self.problem, job.seed)
 
     def in_this_process(self) -> Answer:
         """Run it here, without limits; whatever the method raises comes through."""
+        job, threads = self.record.job, self.record.limits.threads
         with tempfile.TemporaryDirectory(prefix="rotsync-") as name:
             folder = Path(name)
-            save_problem(folder / "problem.npz", self.problem)
-            request = child.Request(
-                problem=str(folder / "problem.npz"),
-                origin=self.method.origin,
-                method=self.method.name,
-                parameters=dict(self.job.parameters),
-                seed=self.job.seed,
-                threads=self.threads,
-                folder=name,
-            )
-            report: dict[str, Any] = {}
-            ended = child.solve(request, child.prepare(request), report)
-            ok = ended.kind == outcome.OK
-            return ended, report, load_estimate(folder / ESTIMATE_FILE, report) if ok else None
+            request = request_in(folder, self.method, job.parameters, self.problem, job.seed, threads)
+            result = child.solve(request, child.prepare(request))
+            return answer(Ended(result.outcome, result.report), folder)
 
     def same(self, ended: Outcome, estimate: Estimate | None) -> bool:
         """Whether it ended as it did then, with every bit of the estimate as it was where that is stored."""
-        if ended.kind != self.record["outcome"]:
+        if ended.kind != self.record.outcome.kind:
             return False
         return self.stored is None or (estimate is not None and _identical(self.stored, estimate))
 
@@ -115,39 +98,25 @@ def prepare(path: Path, data_dir: Path | None = None, plugins: Sequence[Path] = 
     InputError
         Where the file is not a record, or its method or data are not to be had.
     """
-    job, record = _read(path)
+    record = _read(path)
+    job = record.job
     methods = catalog("method", plugins or _plugin_files(job.origin))
     method = methods[job.method]
     run = next((folder for folder in path.resolve().parents if (folder / "plans").is_dir()), None)
     store = Store.open(run) if run is not None else None
     problem, differences = _problem(job, data_dir, plugins, store)
-    differences += _changes(job, record, method)
-    limits = record["limits"]
-    threads = limits.get("threads") or record.get("threads") or 1
-    stored = store.estimate(job.id) if store is not None and record["outcome"] == outcome.OK else None
-    return Repetition(
-        job,
-        record,
-        method,
-        problem,
-        Limits(limits["seconds"], limits["memory_gib"]),
-        threads,
-        stored,
-        tuple(differences),
-    )
+    differences += _changes(record, method)
+    stored = store.estimate(job.id, record) if store is not None and record.outcome.ok else None
+    return Repetition(record, method, problem, stored, tuple(differences))
 
 
-def _read(path: Path) -> tuple[Job, dict[str, Any]]:
+def _read(path: Path) -> Record:
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        job = Job(**record["job"])
-        if not {"outcome", "status", "limits", "versions", "provenance"} <= set(record):
-            raise ValueError("parts of it are missing")
+        return Record.from_json(read_json(path), "the record")
     except FileNotFoundError as error:
         raise InputError(f"{path}: there is no such file; records are in RUN/records") from error
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise InputError(f"{path} is not the record of a job ({type(error).__name__}: {error})") from error
-    return job, record
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} is not the record of a job ({error})") from error
 
 
 def _plugin_files(origin: str) -> list[Path]:
@@ -191,21 +160,21 @@ def _source(job: Job, data_dir: Path | None, plugins: Sequence[Path]) -> tuple[S
     raise InputError(f"{job.dataset} has no instance '{job.instance}' any more")
 
 
-def _changes(job: Job, record: Mapping[str, Any], method: Info) -> list[str]:
+def _changes(record: Record, method: MethodInfo) -> list[str]:
     """What differs besides the data."""
     sentences = []
-    if not job.source_hash:
-        sentences.append("the record does not say which source the method had")
-    elif job.source_hash != method.source_hash:
+    job = record.job
+    if job.source_hash != method.source_hash:
         sentences.append(f"the source of {job.method} has changed")
     here = provenance.of_this_run()
-    then, now = dict(record["versions"]), dict(provenance.versions(method.requires))
+    then = dict(record.versions)
+    now = dict(provenance.versions(method.requires_of(job.parameters)))
     for name in ("python", "bench"):
-        then[name], now[name] = record["provenance"].get(name), here[name]
-    moved = [f"{name} {then.get(name)} then, {now.get(name)} now" for name in then if then[name] != now.get(name)]
+        then[name], now[name] = record.provenance.get(name, "?"), here[name]
+    moved = [f"{name} {then[name]} then, {now.get(name)} now" for name in then if then[name] != now.get(name)]
     if moved:
         sentences.append(f"versions differ: {'; '.join(moved)}")
-    cpu = record["provenance"].get("cpu")
+    cpu = record.provenance.get("cpu")
     if cpu != here["cpu"]:
         sentences.append(f"the processor differs: {cpu} then, {here['cpu']} now")
     return sentences

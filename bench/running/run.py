@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from bench.core import outcome
 from bench.core.errors import InputError
+from bench.core.limits import Limits
 from bench.core.program import program
-from bench.execution.supervise import Limits
 from bench.plugins.catalog import catalog
-from bench.plugins.selection import format_selection
 from bench.running.engines.local import Finished, LocalEngine
 from bench.running.engines.timing import TimingEngine
 from bench.storage.store import Store
-from bench.suite import budget, experiment
+from bench.suite import experiment
 from bench.suite.experiment import Cell, Experiment, Suite
 from bench.suite.plan import Plan
 
@@ -45,8 +44,6 @@ class Options:
         Override the suite's.
     jobs, threads
         How many jobs at a time, and how many threads the numerical libraries of each may use (by default one).
-    budget
-        Threads, seconds and memory of a job in one word, in the place of these three; see `bench.suite.budget`.
     protocol
         Override the protocol of every dataset that has one.
     rerun
@@ -73,7 +70,6 @@ class Options:
     threads: int | None = None
     timeout_s: float | None = None
     memory_gib: float | None = None
-    budget: str | None = None
     protocol: str | None = None
     rerun: Rerun = "never"
     timing: bool = False
@@ -118,8 +114,7 @@ class Run:
         _check_kind(self.store, options.timing)
         self.unreadable: list[str] = []  # a sentence for each record whose job is run again because of that
         chosen = self.experiment.suite
-        self.threads = options.threads or (budget.parse(chosen.budget).threads if chosen.budget else 1)
-        self.limits = Limits(chosen.timeout_s, chosen.memory_gib, "" if _given_alone(options) else chosen.budget)
+        self.limits = Limits(chosen.timeout_s, chosen.memory_gib, options.threads or 1)
         self.todo = [cell for cell in self.cells if not self._done(cell)]
         if options.timing:  # methods can be compared only where they took turns
             affected = {cell.job.instance_key for cell in self.todo}
@@ -133,7 +128,7 @@ class Run:
     @property
     def baseline(self) -> str:
         """The suite's baseline as it is in tables, or the first method where that was not chosen."""
-        planned = [format_selection(cell.job.method, cell.job.parameters) for cell in self.cells]
+        planned = [cell.job.label for cell in self.cells]
         return self.experiment.suite.baseline if self.experiment.suite.baseline in planned else planned[0]
 
     def only(self, jobs: Collection[str]) -> "Run":
@@ -151,12 +146,14 @@ class Run:
         except InputError as error:
             self.unreadable.append(str(error))
             return False
-        if record is None or record["outcome"] == outcome.NOT_INSTALLED:
+        ended = record.outcome.kind if record else outcome.NOT_RUN
+        if record is None or ended == outcome.NOT_INSTALLED:
             return False
         if self.options.rerun == "failed":
-            return record["outcome"] in (outcome.OK, outcome.SKIPPED)
-        hit = {outcome.TIMEOUT: "seconds", outcome.OUT_OF_MEMORY: "memory_gib"}.get(record["outcome"])
-        return hit is None or record["limits"][hit] >= getattr(self.limits, hit)
+            return ended in (outcome.OK, outcome.SKIPPED)
+        if ended == outcome.TIMEOUT:
+            return record.limits.seconds >= self.limits.seconds
+        return ended != outcome.OUT_OF_MEMORY or record.limits.memory_gib >= self.limits.memory_gib
 
     def prepare(self, tell: Callable[[str], None] = lambda _: None) -> None:
         """Load the instances that are not stored yet, then keep the plan.
@@ -185,14 +182,14 @@ class Run:
             yield from finished
 
     def _engine(self) -> "LocalEngine | TimingEngine | DaskEngine":
-        workers, threads = self.options.jobs or os.cpu_count() or 1, self.threads
+        workers = self.options.jobs or os.cpu_count() or 1
         if self.options.timing:
-            return TimingEngine(self.store, self.limits, threads)
+            return TimingEngine(self.store, self.limits)
         if self.options.engine == "dask":
             from bench.running.engines.dask import DaskEngine
 
-            return DaskEngine(self.store, self.limits, workers, threads, self.options.scheduler)
-        return LocalEngine(self.store, self.limits, workers, threads)
+            return DaskEngine(self.store, self.limits, workers, self.options.scheduler)
+        return LocalEngine(self.store, self.limits, workers)
 
 
 def _resolved(
@@ -212,7 +209,8 @@ def _resolved(
         "methods": tuple(methods) or (*suite.methods, *plugged_in),
         "seeds": options.seeds,
         "rounds": options.rounds,
-        **_limits(options),
+        "timeout_s": options.timeout_s,
+        "memory_gib": options.memory_gib,
     }
     if datasets:
         changes["datasets"] = experiment.narrowed(suite.datasets, datasets)
@@ -229,22 +227,6 @@ def _resolved(
         protocol=options.protocol,
         timing=options.timing,
     )
-
-
-def _given_alone(options: Options) -> list[str]:
-    """Limits that were given one by one."""
-    given = {"--threads": options.threads, "--timeout": options.timeout_s, "--memory": options.memory_gib}
-    return [name for name, value in given.items() if value is not None]
-
-
-def _limits(options: Options) -> dict[str, Any]:
-    """Fields of the suite that the limits among the options override."""
-    if options.budget is None:
-        return {"timeout_s": options.timeout_s, "memory_gib": options.memory_gib}
-    if alone := _given_alone(options):
-        raise InputError(f"--budget stands for {alone[0]} too; give one of them")
-    limits = budget.parse(options.budget)
-    return {"budget": limits.name, "timeout_s": limits.seconds, "memory_gib": limits.memory_gib}
 
 
 def _check_engine(options: Options) -> None:

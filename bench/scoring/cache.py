@@ -22,11 +22,11 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 import bench
-from bench.core import outcome
 from bench.core.errors import InputError
 from bench.core.problem import Estimate, Floats, Instance
 from bench.scoring.metrics.errors import all_camera_errors
-from bench.scoring.row import NOT_RUN, scored
+from bench.scoring.row import scored
+from bench.storage.record import Record
 from bench.storage.store import AGAIN, Store
 from bench.suite.plan import Job
 
@@ -60,7 +60,16 @@ SCHEMA = pa.schema(
 )
 ERRORS = pa.field("errors", pa.list_(pa.float64()))
 
-_Read = tuple[tuple[Job, int], Instance, Mapping[str, Any], Estimate | None]
+
+@dataclass(frozen=True)
+class _Found:
+    """What is stored of a job, with the stamp of its record."""
+
+    job: Job
+    stamp: int
+    instance: Instance
+    record: Record | None
+    estimate: Estimate | None
 
 
 @dataclass(frozen=True)
@@ -141,22 +150,22 @@ class _Scorer:
 
     def _rows(self, jobs: Sequence[tuple[Job, int]]) -> Iterator[dict[str, Any]]:
         read = [found for job, stamp in jobs if (found := self._read(job, stamp))]
-        solved = [(estimate.rotations, i.truth) for _, i, _, estimate in read if estimate and i.truth is not None]
-        errors = iter(all_camera_errors(solved, self.rule))
-        for (job, stamp), instance, record, estimate in read:
-            of_job = np.full(instance.problem.n, np.nan) if instance.truth is not None else np.empty(0)
-            if estimate is not None and instance.truth is not None:
-                of_job = next(errors)
-            try:
-                row = scored(instance, record, estimate, of_job)
-                yield {**row, "job": job.id, "stamp": stamp, **_typed(row)}
-            except (TypeError, ValueError, KeyError, AttributeError) as error:
-                self._tell(job, f"{self.store.record_path(job.id)} cannot be read ({error}); {AGAIN}")
+        solved = {
+            found.job.id: (found.estimate.rotations, found.instance.truth)
+            for found in read
+            if found.estimate is not None and found.instance.truth is not None
+        }
+        errors = dict(zip(solved, all_camera_errors(list(solved.values()), self.rule), strict=True))
+        for found in read:
+            cameras = found.instance.problem.n if found.instance.truth is not None else 0
+            of_job = errors.get(found.job.id, np.full(cameras, np.nan))
+            row = scored(found.instance, found.record, found.estimate, of_job)
+            yield {**row, "job": found.job.id, "stamp": found.stamp}
 
-    def _read(self, job: Job, stamp: int) -> _Read | None:
+    def _read(self, job: Job, stamp: int) -> _Found | None:
         try:
-            record = (self.store.record(job.id) if stamp >= 0 else None) or NOT_RUN
-            estimate = self.store.estimate(job.id, record) if record["outcome"] == outcome.OK else None
+            record = self.store.record(job.id) if stamp >= 0 else None
+            estimate = self.store.estimate(job.id, record) if record and record.outcome.ok else None
         except InputError as error:
             self._tell(job, str(error))
             return None
@@ -164,7 +173,7 @@ class _Scorer:
         if estimate is not None and len(estimate.rotations) != instance.problem.n:
             self._tell(job, f"{self.store.estimate_path(job.id)} does not fit its instance; {AGAIN}")
             return None
-        return (job, stamp), instance, record, estimate
+        return _Found(job, stamp, instance, record, estimate)
 
     def _tell(self, job: Job, sentence: str) -> None:
         self.unreadable[job.id] = sentence
@@ -238,16 +247,6 @@ def _located(parts: Sequence[_Part], ids: pa.StringArray, stamps: Any) -> Any:
         found[fits] = at[fits] + offset
         offset += part.table.num_rows
     return found
-
-
-def _typed(row: dict[str, Any]) -> dict[str, Any]:
-    """The row with numbers where `SCHEMA` has numbers; raises ValueError or TypeError where a record has none."""
-
-    def typed(names: Sequence[str], kind: type) -> dict[str, Any]:
-        return {name: None if row.get(name) is None else kind(row[name]) for name in names}
-
-    numbers, whole, text = typed(_NUMBERS, float), typed((*_WHOLE, "iterations"), int), typed(_TEXT, str)
-    return row | numbers | whole | text | {"round_s": [float(s) for s in row["round_s"]]}
 
 
 def _tabulated(rows: Sequence[Mapping[str, Any]]) -> pa.Table:

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bench.core.errors import InputError
+from bench.core.outcome import OK
 from bench.core.problem import Floats
+from bench.plugins.selection import label
 from bench.scoring.inference.difference import holm
 from bench.scoring.inference.ratio import Ratio, error_ratio, mean_ratio, time_ratio
 from bench.scoring.inference.resampling import CENTRES, SMALLEST, Statistic, padded, seed_scores
-from bench.scoring.results import Configured, Place, Results
+from bench.scoring.results import CONFIGURED, PLACE, Configured, Place, Results
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +21,6 @@ if TYPE_CHECKING:
 Cell = tuple[str, str, str, str, str, int]  # dataset, instance, protocol, method, params, seed
 Row = dict[str, Any]
 
-OK = "ok"
 ALL = "all"
 NOWHERE: Place = ("", "", "")
 IDENTICAL = "identical"
@@ -34,7 +35,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Change:
     """A job that ended otherwise than before, or solved other cameras."""
 
     cell: Cell
@@ -45,8 +46,7 @@ class Outcome:
     def __str__(self) -> str:
         """A sentence."""
         dataset, instance, _, method, params, seed = self.cell
-        label = f"{method}[{params}]" if params else method
-        return f"{label} on {dataset}/{instance}, seed {seed}: {self.old} -> {self.new}"
+        return f"{label(method, params)} on {dataset}/{instance}, seed {seed}: {self.old} -> {self.new}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class Comparison:
     """
 
     rows: "pd.DataFrame"
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[Change, ...]
     cells: int
     identical: bool
     notes: tuple[str, ...]
@@ -78,7 +78,7 @@ class Comparison:
     @property
     def regressed(self) -> bool:
         """Whether anything is worse."""
-        return bool((self.rows["verdict"] == "worse").any()) or any(outcome.worse for outcome in self.outcomes)
+        return bool((self.rows["verdict"] == "worse").any()) or any(change.worse for change in self.outcomes)
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class _Job:
 
     @property
     def ended(self) -> str:
-        return str(self.row["status"]).split("(")[0]
+        return str(self.row["outcome"])
 
     @property
     def rounds(self) -> Floats:
@@ -145,13 +145,12 @@ def compare(old: Results, new: Results, threshold: float = 1.05, *, no_times: st
 
 
 def _jobs(results: Results) -> dict[Cell, _Job]:
-    """Every job of a run; the errors of a place's method are in the order of its rows."""
-    waiting = {(place, method): iter(errors) for place, own in results.errors.items() for method, errors in own.items()}
+    """Every job of a run."""
     found = {}
     for row in results.frame.to_dict("records"):
-        place, method = (row["dataset"], row["instance"], row["protocol"]), (row["method"], row["params"])
-        errors = next(waiting.get((place, method), iter(())), None)
-        found[*place, *method, int(row["seed"])] = _Job({str(k): v for k, v in row.items()}, errors)
+        known = {str(name): value for name, value in row.items()}
+        cell = (*(known[name] for name in (*PLACE, *CONFIGURED)), int(known["seed"]))
+        found[cell] = _Job(known, results.job_errors.get(known["job"]))
     return found
 
 
@@ -248,13 +247,13 @@ def _judged(level: str, found: Mapping[_Key, _Compared], threshold: float) -> It
         yield dict(zip(COLUMNS, (*head, *values), strict=True))
 
 
-def _outcomes(pairs: _Pairs) -> Iterator[Outcome]:
+def _outcomes(pairs: _Pairs) -> Iterator[Change]:
     for cell, (old, new) in pairs.items():
         if old.ended != new.ended:
-            yield Outcome(cell, str(old.row["status"]), str(new.row["status"]), old.ended == OK)
+            yield Change(cell, str(old.row["status"]), str(new.row["status"]), old.ended == OK)
         elif old.ended == OK and old.row["n_solved"] != new.row["n_solved"]:
             before, after = (int(job.row["n_solved"]) for job in (old, new))
-            yield Outcome(cell, f"{before} cameras solved", f"{after}", after < before)
+            yield Change(cell, f"{before} cameras solved", f"{after}", after < before)
 
 
 def _identical(old: _Job, new: _Job) -> bool:

@@ -2,7 +2,8 @@
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,6 +43,8 @@ class Results:
         One row for each (instance, method, parameters, seed) that was planned, whatever became of it.
     errors
         For each place and each configured method, its per-camera errors (n,) in degrees, one array a seed.
+    job_errors
+        The same by the id of the job, which is in the frame's column ``job``; for jobs that have ground truth.
     ties
         For each place, the configured methods that cannot be told apart from the best.
     footnotes
@@ -59,6 +62,7 @@ class Results:
     footnotes: tuple[str, ...]
     alignment: str
     curves: Mapping[Place, Mapping[Configured, Sequence[Curve]]]
+    job_errors: Mapping[str, Floats] = field(default_factory=dict)
 
 
 def score(
@@ -111,7 +115,28 @@ def score(
         if oracle:
             frame = _with_oracle(frame, along)
     footnotes = [*_instance_notes(frame, scores.table), *scores.unreadable, *(plans[-1].missing if plans else ())]
-    return Results(frame, errors, ties, tuple(footnotes), rule, curves)
+    return Results(frame, errors, ties, tuple(footnotes), rule, curves, JobErrors(scores))
+
+
+class JobErrors(Mapping[str, Floats]):
+    """Camera errors (n,) in degrees by job, for jobs that have ground truth; read when they are asked for."""
+
+    def __init__(self, scores: Scores) -> None:
+        self._scores = scores
+
+    @cached_property
+    def _rows(self) -> dict[str, int]:
+        ids, known = (self._scores.table[name].to_pylist() for name in ("job", "has_truth"))
+        return {job: row for row, (job, has_truth) in enumerate(zip(ids, known, strict=True)) if has_truth}
+
+    def __getitem__(self, job: str) -> Floats:
+        return self._scores.errors([self._rows[job]])[0]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
 
 
 class CameraErrors(Mapping[Place, Mapping[Configured, tuple[Floats, ...]]]):
@@ -124,10 +149,9 @@ class CameraErrors(Mapping[Place, Mapping[Configured, tuple[Floats, ...]]]):
         self._scores = scores
         self.rows: dict[Place, dict[Configured, list[int]]] = {}
         known = scores.table["has_truth"].to_numpy()
-        groups = frame.groupby([*PLACE, *CONFIGURED], sort=False, dropna=False).indices
-        for key, rows in sorted(groups.items(), key=lambda group: group[1][0]):
-            if known[rows].any():
-                self.rows.setdefault(key[:3], {})[key[3:]] = rows.tolist()
+        for row, (place, method) in enumerate(zip(_tuples(frame, PLACE), _tuples(frame, CONFIGURED), strict=True)):
+            if known[row]:
+                self.rows.setdefault(place, {}).setdefault(method, []).append(row)
 
     def __getitem__(self, place: Place) -> dict[Configured, tuple[Floats, ...]]:
         return self.of(place)
@@ -141,6 +165,11 @@ class CameraErrors(Mapping[Place, Mapping[Configured, tuple[Floats, ...]]]):
 
     def __len__(self) -> int:
         return len(self.rows)
+
+
+def _tuples(frame: "pd.DataFrame", columns: Sequence[str]) -> Iterator[Any]:
+    """What the rows have in some columns."""
+    return zip(*(frame[column].tolist() for column in columns), strict=True)
 
 
 def _frame(jobs: Sequence[Job], table: "pa.Table", rule: str) -> "pd.DataFrame":
@@ -198,17 +227,15 @@ def _along(store: Store, jobs: Sequence[Job], table: "pa.Table", rule: str) -> d
 
 def _compare_times(frame: "pd.DataFrame", baseline: str) -> None:
     """Add to every row how many times faster than the baseline on the same problem it was."""
-    rows = frame.to_dict("records")
-
-    def place(row: Mapping[str, Any]) -> Place:
-        return row["dataset"], row["instance"], row["protocol"]
-
-    named = [row for row in rows if label(row["method"], row["params"]) == baseline]
-    of_seed = {(place(row), row["seed"]): row["round_s"] for row in named}
-    of_any = {place(row): row["round_s"] for row in reversed(named)}  # a deterministic baseline has one seed
+    rows = list(_tuples(frame, [*PLACE, *CONFIGURED, "seed", "round_s"]))
+    named = [
+        (place, seed, rounds) for *place, method, params, seed, rounds in rows if label(method, params) == baseline
+    ]
+    of_seed = {(*place, seed): rounds for place, seed, rounds in named}
+    of_any = {tuple(place): rounds for place, _, rounds in reversed(named)}  # a deterministic baseline has one seed
     ratios = []
-    for row in rows:
-        own, base = row["round_s"], of_seed.get((place(row), row["seed"]), of_any.get(place(row), ()))
+    for *place, _, _, seed, own in rows:
+        base = of_seed.get((*place, seed), of_any.get(tuple(place), ()))
         ratios.append(speedup(base, own) if len(own) and len(own) == len(base) else (np.nan, np.nan, np.nan))
     frame[["speedup", "speedup_low", "speedup_high"]] = np.array(ratios)
     frame["baseline"] = baseline
@@ -220,8 +247,8 @@ def _with_oracle(frame: "pd.DataFrame", along: Mapping[int, Curve]) -> "pd.DataF
 
     if not along:
         return frame
-    rows = frame.to_dict("records")
-    added = pd.DataFrame([_oracle_row(rows[k], one) for k, one in along.items()], index=list(along))
+    rows = [_oracle_row({str(k): v for k, v in frame.loc[row].items()}, one) for row, one in along.items()]
+    added = pd.DataFrame(rows, index=list(along))
     both = pd.concat([frame, added.astype(frame.dtypes.to_dict(), errors="ignore")]).sort_index(kind="stable")
     return both.reset_index(drop=True)
 

@@ -1,32 +1,30 @@
 """The row of one job: what was measured, and how good its estimate is."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from bench.core import outcome
+from bench.core.outcome import Outcome
 from bench.core.problem import Estimate, Floats, Instance
 from bench.scoring.metrics.errors import edge_metrics, summary
 from bench.scoring.metrics.roc import roc_auc
+from bench.storage.record import Record, Report
 
-MEASURED = ("solve_s", "peak_mib", "conversion_s")
-REPORTED = ("iterations", "stop_reason", "cost", "certificate")
 OF_INSTANCE = ("edges_percent", "hardness")
-NOT_RUN = {"outcome": outcome.NOT_RUN, "status": outcome.NOT_RUN}
 
 
-def scored(instance: Instance, record: Mapping[str, Any], estimate: Estimate | None, errors: Floats) -> dict[str, Any]:
+def scored(instance: Instance, record: Record | None, estimate: Estimate | None, errors: Floats) -> dict[str, Any]:
     """Everything that a table knows of a job, as long as its record stays as it is.
 
     Parameters
     ----------
     instance, record
-        Of the job; `NOT_RUN` where there is no record.
+        Of the job; None where it has not been run.
     estimate
         None unless the outcome is ``ok``.
     errors
-        Of its cameras, in degrees; none where there is no truth.
+        (n,) of its cameras, in degrees; none where there is no truth.
     """
     problem, truth = instance.problem, instance.truth
     scores: dict[str, Any] = {"n_solved": 0, "roc_auc": np.nan}
@@ -36,23 +34,30 @@ def scored(instance: Instance, record: Mapping[str, Any], estimate: Estimate | N
         scores |= edge_metrics(problem, rotations, truth)
         if estimate.edge_weights is not None and instance.outliers is not None:
             scores["roc_auc"] = roc_auc(estimate.edge_weights, instance.outliers)
+    ended = record.outcome if record else Outcome(outcome.NOT_RUN)
+    report, round_s = (record.report, record.round_s) if record else (Report(), ())
     return {
         "protocol": instance.protocol,
-        "outcome": record["outcome"],
-        "status": record["status"],
+        "outcome": ended.kind,
+        "status": ended.text,
         **summary(errors),
-        **{name: record.get(name) for name in MEASURED},
+        "solve_s": report.solve_s,
+        "peak_mib": report.peak_mib,
+        "conversion_s": report.conversion_s,
         "n_cameras": problem.n,
         "n_edges": problem.m,
         **scores,
         **{name: instance.statistics.get(name) for name in OF_INSTANCE},
-        **{name: record.get(name) for name in REPORTED},
-        "notes": "; ".join(record.get("notes", ())),
-        "round_s": record.get("round_s", ()),
-        "min_s": record.get("min_s"),
-        "waited": record.get("waited"),
+        "iterations": report.iterations,
+        "stop_reason": report.stop_reason,
+        "cost": report.cost,
+        "certificate": report.certificate,
+        "notes": "; ".join(report.notes),
+        "round_s": round_s,
+        "min_s": min(round_s, default=None),
+        "waited": report.waited,
         "has_truth": truth is not None,
-        "n_checkpoints": len(record.get("checkpoints", ())) if estimate is not None else 0,
+        "n_checkpoints": len(report.checkpoints) if estimate is not None else 0,
         "instance_notes": list(instance.notes),
         "errors": errors,
     }

@@ -7,27 +7,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.core.errors import InputError, shown
-from bench.core.problem import Checkpoint, Estimate, Problem
+from bench.core.problem import INFORMATION, Checkpoint, Estimate, Problem, WeightsKind
 from bench.formats import archive
+from bench.storage.record import Report
 
 
 def save_problem(path: Path, problem: Problem) -> None:
     """Write a problem as uncompressed ``.npz``."""
     arrays: dict[str, Any] = {"n": problem.n, "edges": problem.edges, "rotations": problem.rotations}
+    arrays |= {name: getattr(problem, name) for name in problem.carries}
     if problem.weights is not None:
-        arrays["weights"] = problem.weights
+        arrays["counted"] = problem.weights_kind == "count"
     with path.open("wb") as file:
         np.savez(file, **arrays)
 
 
 def load_problem(path: Path) -> Problem:
     """Read what `save_problem` wrote; raises `InputError` where the file holds something else."""
-    arrays = archive.load(path, ("n", "edges", "rotations", "weights"))
+    arrays = archive.load(path, ("n", "edges", "rotations", *INFORMATION, "counted"))
     try:
         n = arrays["n"]
         if n.shape != () or n.dtype.kind not in "iu":
             raise InputError(f"n must be a whole number, not {n.dtype} of shape {n.shape}")
-        return Problem(int(n), arrays["edges"], arrays["rotations"], arrays.get("weights"))
+        carried = {name: arrays[name] for name in INFORMATION if name in arrays}
+        kind: WeightsKind = "count" if arrays.get("counted", False) else "precision"
+        return Problem(int(n), arrays["edges"], arrays["rotations"], weights_kind=kind, **carried)
     except (KeyError, InputError) as error:
         raise InputError(f"{path}: {_said(error)}") from error
 
@@ -43,13 +47,13 @@ def save_estimate(path: Path, estimate: Estimate) -> None:
         np.savez(file, **arrays)
 
 
-def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
-    """Read what `save_estimate` wrote, with the scalars that the record holds.
+def load_estimate(path: Path, report: Report) -> Estimate:
+    """Read what `save_estimate` wrote, with what the child told besides.
 
     Raises
     ------
     InputError
-        Where the file holds something else, or another number of checkpoints than the record.
+        Where the file holds something else, or another number of checkpoints than the report.
     """
     arrays = archive.load(path, ("rotations", "edge_weights", "checkpoints"))
     try:
@@ -58,18 +62,18 @@ def load_estimate(path: Path, scalars: dict[str, Any]) -> Estimate:
         return Estimate(
             rotations=arrays["rotations"],
             edge_weights=_floats(arrays["edge_weights"], (-1,)) if "edge_weights" in arrays else None,
-            iterations=scalars.get("iterations"),
-            stop_reason=scalars.get("stop_reason", ""),
-            cost=scalars.get("cost"),
-            certificate=scalars.get("certificate"),
+            iterations=report.iterations,
+            stop_reason=report.stop_reason,
+            cost=report.cost,
+            certificate=report.certificate,
             checkpoints=tuple(
-                Checkpoint(rotations=state, **facts)
-                for state, facts in zip(states, scalars.get("checkpoints", ()), strict=True)
+                Checkpoint(moment.iteration, moment.seconds, state, moment.diagnostics)
+                for state, moment in zip(states, report.checkpoints, strict=True)
             ),
-            conversion_s=scalars.get("conversion_s", 0.0),
-            notes=tuple(scalars.get("notes", ())),
+            conversion_s=report.conversion_s or 0.0,
+            notes=report.notes,
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, ValueError) as error:
         raise InputError(f"{path}: {_said(error)}") from error
 
 

@@ -5,11 +5,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.core import outcome
-from bench.core.errors import InputError, described
+from bench.core.errors import InputError
 from bench.core.program import program
 from bench.storage.store import ASIDE, Store
-from bench.suite.plan import Job, Plan, decode, encode
+from bench.suite.plan import Plan
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class Finding:
 
 
 def examine(folder: Path) -> list[Finding]:
-    """Read everything that a run's folder holds; nothing is changed, except that an old layout is brought up to date.
+    """Read everything that a run's folder holds; nothing is changed.
 
     Raises
     ------
@@ -57,7 +56,7 @@ def repair(folder: Path, findings: list[Finding]) -> None:
         elif finding.remedy == "remove":
             shutil.rmtree(finding.path) if finding.path.is_dir() else finding.path.unlink(missing_ok=True)
         elif finding.remedy == "plan":
-            adopted.append(_job(store, finding.path.stem))
+            adopted += [record.job] if (record := store.record(finding.path.stem)) else []
     if adopted:
         store.add_plan(Plan("recovered", tuple(adopted), command=f"{program()} doctor --repair"))
 
@@ -88,34 +87,17 @@ def _records(store: Store) -> Iterator[Finding]:
         except InputError as error:
             yield Finding(path, _reason(error), "aside")
             continue
-        if record["outcome"] == outcome.OK:
+        if record.outcome.ok:
             try:
                 store.estimate(path.stem, record)
             except InputError as error:
                 yield Finding(path, f"its estimate is not there or damaged: {_reason(error)}", "aside")
                 continue
         if path.stem not in planned:
-            yield _unplanned(store, path)
+            yield Finding(path, "no plan names this record, so no table shows it", "plan")
     for path in sorted(store.folder.glob("estimates/*/*.npz")):
         if path.stem not in recorded:
             yield Finding(path, "an estimate without a record, left by a run that was killed", "remove")
-
-
-def _unplanned(store: Store, path: Path) -> Finding:
-    try:
-        _job(store, path.stem)
-    except InputError as error:
-        return Finding(path, f"no plan names it, and its record does not tell its job: {error}", "aside")
-    return Finding(path, "no plan names this record, so no table shows it", "plan")
-
-
-def _job(store: Store, job_id: str) -> Job:
-    record = store.record(job_id) or {}
-    try:
-        job = Job(**record["job"])
-        return decode(encode(Plan("", (job,)))).jobs[0]
-    except Exception as error:  # it may be told in any wrong way
-        raise InputError(described(error)) from error
 
 
 def _instances(store: Store) -> Iterator[Finding]:

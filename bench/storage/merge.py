@@ -4,10 +4,9 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from bench.core import outcome
 from bench.core.errors import InputError
+from bench.storage.record import Record
 from bench.storage.store import Store
 
 
@@ -64,7 +63,7 @@ def _merge_record(source: Store, target: Store, job_id: str, merged: Merged) -> 
         theirs = source.record(job_id)
         if theirs is None:
             return
-        if theirs["outcome"] == outcome.OK:
+        if theirs.outcome.ok:
             source.estimate(job_id, theirs)
     except InputError as error:
         merged.told.append(str(error))
@@ -72,12 +71,12 @@ def _merge_record(source: Store, target: Store, job_id: str, merged: Merged) -> 
     ours = _readable(target, job_id)
     if ours is not None and not _better(theirs, ours):
         merged.kept += 1
-        if theirs["outcome"] == ours["outcome"] == outcome.OK and _differ(source, target, job_id):
+        if theirs.outcome.ok and ours.outcome.ok and _differ(source, target, job_id):
             merged.told.append(
                 f"the estimates of job {job_id} differ between {target.folder}, which is kept, and {source.folder}"
             )
         return
-    if theirs["outcome"] == outcome.OK:
+    if theirs.outcome.ok:
         target.copy_in(source.estimate_path(job_id), target.estimate_path(job_id))
     target.copy_in(source.record_path(job_id), target.record_path(job_id))
     if ours is None:
@@ -86,23 +85,20 @@ def _merge_record(source: Store, target: Store, job_id: str, merged: Merged) -> 
         merged.replaced += 1
 
 
-def _readable(store: Store, job_id: str) -> dict[str, Any] | None:
+def _readable(store: Store, job_id: str) -> Record | None:
     try:
         record = store.record(job_id)
-        if record is not None and record["outcome"] == outcome.OK:
+        if record is not None and record.outcome.ok:
             store.estimate(job_id, record)
     except InputError:
         return None
     return record
 
 
-def _better(theirs: dict[str, Any], ours: dict[str, Any]) -> bool:
-    well = theirs["outcome"] == outcome.OK, ours["outcome"] == outcome.OK
-    return well[0] if any(well) and not all(well) else not any(well) and _finished(theirs) > _finished(ours)
-
-
-def _finished(record: dict[str, Any]) -> str:
-    return str(record.get("finished", ""))
+def _better(theirs: Record, ours: Record) -> bool:
+    if theirs.outcome.ok or ours.outcome.ok:
+        return not ours.outcome.ok
+    return theirs.finished > ours.finished
 
 
 def _differ(source: Store, target: Store, job_id: str) -> bool:

@@ -14,7 +14,6 @@ cell of the experiment, the newest plan's job is the one that counts.
 """
 
 import contextlib
-import hashlib
 import json
 import os
 import shutil
@@ -22,29 +21,38 @@ import socket
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bench.core import typed
+from bench.core.digest import digest
 from bench.core.errors import InputError, described, shown
 from bench.core.problem import Estimate, Instance
 from bench.core.program import program
 from bench.formats import archive
-from bench.storage import migration
 from bench.storage.arrays import load_estimate, load_problem, save_problem
+from bench.storage.record import SCHEMA, Record, Report
 from bench.suite.plan import Job, Plan, decode, encode, newest
 
+VERSION = "schema.json"
 ASIDE = "damaged"  # where what cannot be read is moved
 AGAIN = "run the same command again"
 
 
-def digest(value: Any) -> str:
-    """Hash of a JSON-like value, 24 hexadecimal digits."""
-    text = json.dumps(value, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
+@dataclass(frozen=True)
+class _Facts:
+    """What is kept of an instance besides its arrays; see `bench.core.problem.Instance`."""
+
+    name: str
+    protocol: str
+    source: str
+    revision: str
+    notes: tuple[str, ...]
+    statistics: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -60,29 +68,29 @@ class Store:
 
     @classmethod
     def open(cls, folder: Path) -> "Store":
-        """Open a run that exists; one that an older version wrote is brought to today's layout first.
+        """Open a run that exists.
 
         Raises
         ------
         InputError
-            Where the folder holds no run, or one of a newer version.
+            Where the folder holds no run, or one of another version.
         """
         if not (folder / "plans").is_dir():
             raise InputError(f"{folder} is not the folder of a run; make one with: {program()} run --out {folder}")
-        migration.migrate(folder)
+        _check_version(folder / VERSION)
         return cls(folder)
 
     def add_plan(self, plan: Plan) -> None:
         """Keep a plan."""
         self.mark()
-        content = encode(plan) | {"schema": migration.SCHEMA}
+        content = encode(plan)
         moment = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%f")
         self._write_json(self.folder / "plans" / f"{moment}-{digest(content)[:8]}.json", content, indent=None)
 
     def mark(self) -> None:
         """Write the version of the layout, before the first plan."""
-        if not (self.folder / migration.FILE).exists():
-            self._write_json(self.folder / migration.FILE, {"schema": migration.SCHEMA})
+        if not (self.folder / VERSION).exists():
+            self._write_json(self.folder / VERSION, {"schema": SCHEMA})
 
     def plans(self) -> list[Plan]:
         """Every plan, oldest first.
@@ -97,7 +105,7 @@ class Store:
     def plan(self, path: Path) -> Plan:
         """Read one plan; raises `InputError` where that fails."""
         with _reading(path, f"see: {program()} doctor {self.folder} --repair"):
-            return decode(_read_json(path))
+            return decode(read_json(path), "the plan")
 
     def jobs(self) -> list[Job]:
         """The newest job of every cell that was ever planned, in the order of planning."""
@@ -113,9 +121,8 @@ class Store:
             hidden: dict[str, Any] = {"truth": instance.truth, "outliers": instance.outliers}
             with (work / "truth.npz").open("wb") as file:
                 np.savez(file, **{name: value for name, value in hidden.items() if value is not None})
-            facts = {f: getattr(instance, f) for f in ("name", "protocol", "source", "revision", "notes")}
-            facts["statistics"] = dict(instance.statistics)
-            self._write_json(work / "instance.json", facts)
+            facts = {f.name: getattr(instance, f.name) for f in fields(_Facts)}
+            self._write_json(work / "instance.json", facts | {"statistics": dict(instance.statistics)})
             final.parent.mkdir(parents=True, exist_ok=True)
             try:
                 work.rename(final)
@@ -150,11 +157,10 @@ class Store:
             shapes = {"truth": (problem.n, 3, 3), "outliers": (problem.m,)}
             if any(values.shape != shapes[name] for name, values in hidden.items()):
                 raise ValueError("truth.npz does not fit problem.npz")
-            facts = _read_json(folder / "instance.json")
-            facts["notes"] = tuple(facts["notes"])
-            return Instance(problem, hidden.get("truth"), outliers=hidden.get("outliers"), **facts)
+            facts = typed.read(_Facts, read_json(folder / "instance.json"), "instance.json")
+            return Instance(problem, hidden.get("truth"), outliers=hidden.get("outliers"), **vars(facts))
 
-    def record(self, job_id: str) -> dict[str, Any] | None:
+    def record(self, job_id: str) -> Record | None:
         """Record of a job, or None where there is none.
 
         Raises
@@ -165,27 +171,28 @@ class Store:
         path = self.record_path(job_id)
         with _reading(path, AGAIN):
             try:
-                record = _read_json(path)
+                record = Record.from_json(read_json(path), "the record")
             except FileNotFoundError:
                 return None
-            if not isinstance(record["outcome"], str) or not isinstance(record["status"], str):
-                raise ValueError("no outcome")
+            if record.job.id != job_id:
+                raise ValueError("it is the record of another job")
             return record
 
-    def add_record(self, job_id: str, record: Mapping[str, Any], estimate: Path | None) -> None:
+    def add_record(self, record: Record, estimate: Path | None) -> None:
         """Keep the record of a job and, before it, the file of its estimate."""
         if estimate is not None:
-            final = self.estimate_path(job_id)
+            final = self.estimate_path(record.job.id)
             with _writing(final):
                 self._make(final.parent)
                 estimate.replace(final)
-        self._write_json(self.record_path(job_id), {**record, "schema": migration.SCHEMA}, indent=None)
+        self._write_json(self.record_path(record.job.id), record.to_json(), indent=None)
 
-    def estimate(self, job_id: str, record: Mapping[str, Any] | None = None) -> Estimate:
+    def estimate(self, job_id: str, record: Record | None = None) -> Estimate:
         """Estimate of a job whose outcome is ``ok``; raises `InputError` where it cannot be read."""
         path = self.estimate_path(job_id)
+        record = record or self.record(job_id)
         with _reading(path, AGAIN):
-            return load_estimate(path, dict(record or self.record(job_id) or {}))
+            return load_estimate(path, record.report if record else Report())
 
     @contextmanager
     def work_folder(self) -> Iterator[Path]:
@@ -271,11 +278,25 @@ def _reading(path: Path, remedy: str) -> Iterator[None]:
         raise InputError(f"{path} cannot be read ({_why(error)}); {remedy}") from error
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path) -> dict[str, Any]:
+    """Content of a file that holds a JSON object; raises `OSError` or `ValueError` where there is none."""
     content = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(content, dict):
         raise ValueError("not a JSON object")
     return content
+
+
+def _check_version(path: Path) -> None:
+    """Refuse what another version wrote, which differs in ways that no reader here knows."""
+    try:
+        found = read_json(path).get("schema")
+    except (OSError, ValueError):
+        found = None
+    if found != SCHEMA:
+        raise InputError(
+            f"{path.parent} was written by another version of bench (layout {found}, and this one has {SCHEMA}); "
+            "give this run another folder with --out"
+        )
 
 
 def _why(error: BaseException) -> str:

@@ -2,19 +2,18 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bench.core import typed
+from bench.core.digest import digest
 from bench.core.errors import InputError, shown, suggestion
 from bench.formats import toml_file
 from bench.plugins import selection
 from bench.plugins.catalog import Catalog
 from bench.plugins.configure import parameters_of
-from bench.plugins.declare import Info, Missing, Source
-from bench.storage.store import digest
-from bench.suite import budget
+from bench.plugins.declare import Dataset, DatasetInfo, MethodInfo, Missing, Source
 from bench.suite.plan import Job
 
 DEFAULT_SUITE = "quick"
@@ -37,8 +36,6 @@ class Suite:
         How many seeds, 0 to seeds - 1.
     timeout_s, memory_gib
         Limits of one job; in a timing run, of one round of it.
-    budget
-        Both and the number of threads in one word, in the place of these; see `bench.suite.budget`.
     rounds, baseline
         Of timing runs: how often each job is timed, and the method that the others are compared with, by
         default the first.
@@ -53,7 +50,6 @@ class Suite:
     memory_gib: float = 8.0
     rounds: int = 5
     baseline: str = ""
-    budget: str = ""
 
     def __post_init__(self) -> None:
         """Refuse what no run can have."""
@@ -74,7 +70,7 @@ class Cell:
 
     job: Job
     source: Source
-    method: Info
+    method: MethodInfo
 
 
 @dataclass(frozen=True)
@@ -102,16 +98,11 @@ def load_suite(name: str) -> Suite:
     stem, content = toml_file.read("suite", SUITES, name)
     where = f"suite {name}"
     if "name" in content:
-        raise InputError(f"{where}: unknown key 'name'; a suite is called as its file is")
-    suite = typed.read(Suite, {"name": stem, "title": stem, **content}, where)
+        raise InputError(f"{where}: its name is that of its file; leave out 'name'")
+    suite = typed.read(Suite, {"title": stem, "datasets": (), "methods": ()} | content | {"name": stem}, where)
     if suite.baseline and suite.baseline not in suite.methods:
         guess = suggestion(suite.baseline, suite.methods)
         raise InputError(f"{where}: the baseline {shown(suite.baseline)} is not one of its methods{guess}")
-    if suite.budget:
-        if clash := [key for key in ("timeout_s", "memory_gib") if key in content]:
-            raise InputError(f"{where}: 'budget' stands for '{clash[0]}' too; keep one of them")
-        limits = budget.parse(suite.budget)
-        suite = replace(suite, timeout_s=limits.seconds, memory_gib=limits.memory_gib)
     return suite
 
 
@@ -130,8 +121,8 @@ def narrowed(datasets: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
 
 def resolve(
     suite: Suite,
-    methods: Catalog,
-    datasets: Catalog,
+    methods: Catalog[MethodInfo],
+    datasets: Catalog[DatasetInfo],
     *,
     data_dir: Path | None = None,
     protocol: str | None = None,
@@ -171,19 +162,19 @@ def _absence(dataset: str, names: Sequence[str], command: str) -> str:
     return f"{what} not on disk{which}; get {'them' if len(names) > 1 else 'it'} with: {command}"
 
 
-def instance_key(dataset: Info, configured: Any, source: Source) -> str:
+def instance_key(dataset: DatasetInfo, configured: Dataset, source: Source) -> str:
     """Identity of an instance: its dataset with every parameter, its name and what determines its bytes."""
     return digest([dataset.name, parameters_of(configured), source.name, source.revision])
 
 
 def _cells_of(
     source: Source,
-    dataset: Info,
-    configured: Any,
+    dataset: DatasetInfo,
+    configured: Dataset,
     label: str,
     seed: int,
     seeds: int,
-    methods: Iterable[tuple[Info, dict[str, Any]]],
+    methods: Iterable[tuple[MethodInfo, dict[str, Any]]],
     rounds: int,
 ) -> list[Cell]:
     """Cells of one instance. On data that no seed changes, a deterministic method needs one seed only."""

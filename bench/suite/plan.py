@@ -1,9 +1,13 @@
 """What was asked for: a job is one cell of an experiment, a plan the jobs of one call of `run`."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
+
+from bench.core import typed
+from bench.core.errors import InputError
+from bench.plugins.selection import Value, format_selection
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +37,21 @@ class Job:
     method: str
     title: str
     origin: str
-    parameters: Mapping[str, Any]
+    parameters: Mapping[str, Value]
     seed: int
     rounds: int = 0
     source_hash: str = ""
     dataset_origin: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse keys that would lead out of the folder of a run: they are names of files."""
+        if not (self.id.isalnum() and self.instance_key.isalnum()):
+            raise ValueError("a key has characters other than letters and digits")
+
+    @property
+    def label(self) -> str:
+        """The configured method as a selection: ``method[parameter=value]``."""
+        return format_selection(self.method, self.parameters)
 
     @property
     def cell(self) -> tuple[str, str, str, str, int]:
@@ -79,72 +93,92 @@ def newest(plans: Sequence[Plan]) -> list[Job]:
     return list(jobs.values())
 
 
+@dataclass(frozen=True)
+class _Place:
+    """What jobs on one instance share."""
+
+    dataset: str
+    instance: str
+    instance_key: str
+    dataset_origin: str
+
+
+@dataclass(frozen=True)
+class _Configured:
+    """What jobs of one configured method share."""
+
+    method: str
+    title: str
+    origin: str
+    parameters: Mapping[str, Value]
+    source_hash: str
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """An entry for each job; instances and methods by their place in the plan."""
+
+    id: tuple[str, ...]
+    instance: tuple[int, ...]
+    method: tuple[int, ...]
+    seed: tuple[int, ...]
+    rounds: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A plan as its file holds it: instances and configured methods once each."""
+
+    suite: str
+    command: str
+    baseline: str
+    missing: tuple[str, ...]
+    instances: tuple[_Place, ...]
+    methods: tuple[_Configured, ...]
+    jobs: _Columns
+
+
 def encode(plan: Plan) -> dict[str, Any]:
-    """As JSON: instances and configured methods once each, jobs as columns that refer to them."""
-    instances: dict[tuple[str, ...], int] = {}
+    """As JSON can hold it."""
+    places: dict[_Place, int] = {}
     methods: dict[tuple[str, ...], int] = {}
-    columns: dict[str, list[Any]] = {name: [] for name in ("id", "instance", "method", "seed", "rounds")}
+    configured: list[_Configured] = []
+    rows = []
     for job in plan.jobs:
-        instance = (job.dataset, job.instance, job.instance_key, job.dataset_origin)
-        method = (job.method, job.title, job.origin, job.source_hash, json.dumps(dict(job.parameters)))
-        columns["id"].append(job.id)
-        columns["instance"].append(instances.setdefault(instance, len(instances)))
-        columns["method"].append(methods.setdefault(method, len(methods)))
-        columns["seed"].append(job.seed)
-        columns["rounds"].append(job.rounds)
-    return {
-        "suite": plan.suite,
-        "command": plan.command,
-        "baseline": plan.baseline,
-        "missing": list(plan.missing),
-        "instances": [list(instance) for instance in instances],
-        "methods": [[*names, json.loads(parameters)] for *names, parameters in methods],
-        "jobs": columns,
-    }
+        place = _Place(job.dataset, job.instance, job.instance_key, job.dataset_origin)
+        spelled = (job.method, job.title, job.origin, job.source_hash, json.dumps(dict(job.parameters)))
+        if spelled not in methods:
+            methods[spelled] = len(methods)
+            configured.append(_Configured(job.method, job.title, job.origin, job.parameters, job.source_hash))
+        rows.append((job.id, places.setdefault(place, len(places)), methods[spelled], job.seed, job.rounds))
+    columns = _Columns(*map(tuple, zip(*rows, strict=True))) if rows else _Columns((), (), (), (), ())
+    written = _Written(plan.suite, plan.command, plan.baseline, plan.missing, tuple(places), tuple(configured), columns)
+    parts = {"instances": list(map(vars, places)), "methods": list(map(vars, configured)), "jobs": vars(columns)}
+    return vars(written) | parts  # not `asdict`, which would copy every entry of the columns
 
 
-def decode(content: Mapping[str, Any]) -> Plan:
+def decode(content: Mapping[str, Any], where: str) -> Plan:
     """Read what `encode` wrote.
+
+    Parameters
+    ----------
+    where
+        What it is the content of, for messages.
 
     Raises
     ------
-    KeyError, TypeError, ValueError, IndexError
+    InputError
         Where it is something else.
     """
-    columns = content["jobs"]
-    places = _picked([_strings(entry, 4) for entry in content["instances"]], columns["instance"])
-    methods = _picked([_method(*entry) for entry in content["methods"]], columns["method"])
-    ids = _keys(_strings(columns["id"], len(columns["id"])))
-    _keys([key for _, _, key, _ in content["instances"]])
-    rows = zip(ids, places, methods, columns["seed"], columns["rounds"], strict=True)
-    jobs = tuple(
-        Job(*(key, *place[:3], *method[:4], int(seed), int(rounds), method[4], place[3]))
-        for key, place, method, seed, rounds in rows
-    )
-    missing = _strings(content["missing"], len(content["missing"]))
-    suite, command, baseline = _strings([content[name] for name in ("suite", "command", "baseline")], 3)
-    return Plan(suite, jobs, missing, command, baseline)
-
-
-def _method(name: str, title: str, origin: str, source_hash: str, parameters: Any) -> Any:
-    _strings([name, title, origin, source_hash], 4)
-    return name, title, origin, dict(parameters), source_hash
-
-
-def _picked(entries: Sequence[Any], chosen: Iterable[int]) -> list[Any]:
-    if any(index < 0 for index in chosen):
-        raise IndexError("negative")
-    return [entries[index] for index in chosen]
-
-
-def _keys(names: Sequence[str]) -> Sequence[str]:
-    """Names of files, which must not lead out of their folder."""
-    if not all(name.isalnum() for name in names):
-        raise ValueError("a key has characters other than letters and digits")
-    return names
-
-
-def _strings(values: Sequence[Any], count: int) -> tuple[Any, ...]:
-    if len(values) != count or not all(isinstance(value, str) for value in values):
-        raise TypeError(f"expected {count} strings")
-    return tuple(values)
+    read = typed.read(_Written, content, where)
+    try:
+        if min((*read.jobs.instance, *read.jobs.method), default=0) < 0:
+            raise IndexError("negative")
+        rows = zip(*(getattr(read.jobs, column.name) for column in fields(_Columns)), strict=True)
+        jobs = tuple(
+            Job(id=key, seed=seed, rounds=rounds, **vars(read.instances[place]), **vars(read.methods[method]))
+            for key, place, method, seed, rounds in rows
+        )
+    except (ValueError, IndexError) as error:
+        raise InputError(f"{where}: its jobs do not fit together ({error})") from error
+    return Plan(read.suite, jobs, read.missing, read.command, read.baseline)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench import Estimate, Problem
 
@@ -43,5 +44,5 @@ def large_graphs() -> Iterator[Problem]:
     yield _identities(LARGE, np.stack([np.arange(LARGE - 1), np.arange(1, LARGE)], axis=1))
 
 
-def _identities(cameras: int, edges: "np.ndarray[tuple[int, int], np.dtype[np.intp]]") -> Problem:
+def _identities(cameras: int, edges: NDArray[np.intp]) -> Problem:
     return Problem(cameras, edges.astype(np.int32), np.tile(np.eye(3), (len(edges), 1, 1)))

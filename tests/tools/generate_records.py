@@ -13,9 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from bench.core import so3
+from bench.core.digest import digest
+from bench.core.limits import Limits
+from bench.core.outcome import OK, TIMEOUT, Outcome
 from bench.core.problem import Estimate, Instance, Problem
 from bench.storage.arrays import save_estimate
-from bench.storage.store import Store, digest
+from bench.storage.record import Record, Report
+from bench.storage.store import Store
 from bench.suite.plan import Job, Plan
 
 CAMERAS, DATASETS, METHODS = 5, 10, 10
@@ -52,23 +56,22 @@ def add_record(
     store: Store, job: Job, truth: np.ndarray, rng: np.random.Generator, work: Path, *, failed: bool
 ) -> None:
     """Keep a record of realistic size, and an estimate a few degrees from the truth."""
-    record = {
-        "job": {name: getattr(job, name) for name in Job.__slots__},
-        "outcome": "timeout" if failed else "ok",
-        "status": "timeout(60 s)" if failed else "ok",
-        "finished": "2026-01-01T00:00:00+00:00",
-        "limits": {"seconds": 60.0, "memory_gib": 8.0},
-        "versions": {"numpy": "2.0", "scipy": "1.13"},
-        "provenance": {"command": "python -m bench run", "cpu": 40 * "x", "platform": 60 * "x", "git": 40 * "0"},
-        "wall_s": 0.02,
-    }
+    record = Record(
+        job,
+        Outcome(TIMEOUT, "60 s") if failed else Outcome(OK),
+        Limits(60.0, 8.0),
+        finished="2026-01-01T00:00:00+00:00",
+        versions={"numpy": "2.0", "scipy": "1.13"},
+        provenance={"command": "python -m bench run", "cpu": 40 * "x", "platform": 60 * "x", "git": 40 * "0"},
+        report=Report() if failed else Report(1, solve_s=0.001 * rng.lognormal(), peak_mib=1.5, iterations=12),
+        wall_s=0.02,
+    )
     if failed:
-        store.add_record(job.id, record, None)
+        store.add_record(record, None)
         return
     noise = so3.exp(0.002 * (1 + job.parameters["step"]) * rng.normal(size=(CAMERAS, 3)))
     save_estimate(work / "estimate.npz", Estimate(noise @ truth))
-    record |= {"solve_s": 0.001 * rng.lognormal(), "peak_mib": 1.5, "threads": 1, "iterations": 12, "notes": []}
-    store.add_record(job.id, record, work / "estimate.npz")
+    store.add_record(record, work / "estimate.npz")
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ def main(workers: int) -> None:
             pass
         own, moments = time.process_time(), [time.perf_counter()]
         for _, record in finished:
-            assert record["outcome"] == "ok"
+            assert record.outcome.ok
             moments.append(time.perf_counter())
         own = time.process_time() - own
     jobs = len(moments) - 1

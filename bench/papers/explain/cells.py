@@ -135,9 +135,9 @@ def explain_cell(
         found, status = [], []
         for job in jobs:
             if spelled(job) == method and _protocol(job.dataset) == protocol:
-                record = store.record(job.id) or {"outcome": outcome.NOT_RUN, "status": outcome.NOT_RUN}
-                status.append(record["status"])
-                if record["outcome"] == outcome.OK:
+                record = store.record(job.id)
+                status.append(record.outcome.text if record else outcome.NOT_RUN)
+                if record and record.outcome.ok:
                     found.append((store.estimate(job.id), store.instance(job.instance_key)))
         return found, "; ".join(dict.fromkeys(status)) or outcome.NOT_RUN
 

@@ -44,7 +44,7 @@ def failures(store: Store, frame: pd.DataFrame) -> list[Failure]:
             f"{instance}, seed {seed}" if several else str(instance)
             for instance, seed in zip(rows["instance"], rows["seed"], strict=True)
         ]
-        logs = (str((store.record(job) or {}).get("log", "")).strip() for job in rows["job"])
+        logs = (record.log.strip() for job in rows["job"] if (record := store.record(job)))
         log = next(filter(None, logs), "")[-LOG_LENGTH:]
         found.append(Failure(label(str(method), str(params)), str(status), tuple(dict.fromkeys(where)), log))
     return found

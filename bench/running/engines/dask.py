@@ -16,8 +16,7 @@ import uuid
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
-from dataclasses import asdict
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from distributed import (
     Client,
@@ -33,27 +32,29 @@ from distributed import (
 
 from bench.core import outcome
 from bench.core.errors import InputError
+from bench.core.limits import Limits
 from bench.core.outcome import Outcome
 from bench.execution import provenance
-from bench.execution.job import record_of
+from bench.execution.execute import Ended
 from bench.execution.launch import Launcher
-from bench.execution.supervise import Interrupted, Limits
-from bench.plugins.catalog import import_origin, infos
-from bench.plugins.declare import Info
+from bench.execution.supervise import Interrupted
+from bench.plugins.catalog import method_at
+from bench.plugins.declare import MethodInfo
 from bench.running.engines.folders import WorkFolders
 from bench.running.engines.local import Finished, run_job
+from bench.storage.record import Record
 from bench.storage.store import Store
 from bench.suite.experiment import Cell
 from bench.suite.plan import Job
 
-BUDGET_S = 2.0  # a chunk that has taken longer gives back the jobs that it has not begun
+CHUNK_S = 2.0  # a chunk that has taken longer gives back the jobs that it has not begun
 LONGEST = 256  # jobs of a chunk
 AHEAD = 2  # chunks in flight for each thread of a worker
 CONNECT_S = 10.0
 POLL_S = 0.05
 KEEP_S = 2.0
 
-Chunk: TypeAlias = "Future[list[dict[str, Any]]]"
+Chunk: TypeAlias = "Future[list[Record]]"
 
 
 class DaskEngine:
@@ -68,17 +69,14 @@ class DaskEngine:
     workers
         Worker processes of a cluster of its own, one thread each; with a scheduler, how many threads to keep
         supplied before that many have joined.
-    threads
-        How many threads the numerical libraries of each child may use.
     scheduler
         Address of a running scheduler, such as ``tcp://host:8786``; None for a cluster of its own on this machine.
     """
 
-    def __init__(self, store: Store, limits: Limits, workers: int, threads: int, scheduler: str | None = None) -> None:
+    def __init__(self, store: Store, limits: Limits, workers: int, scheduler: str | None = None) -> None:
         self.store = Store(store.folder.resolve())
         self.limits = limits
         self.workers = workers
-        self.threads = threads
         self.scheduler = scheduler
 
     def run(self, cells: Iterable[Cell]) -> Generator[Finished, None, None]:
@@ -95,7 +93,7 @@ class DaskEngine:
         if not waiting:
             return
         told = {"command": provenance.of_this_run()["command"], "run": uuid.uuid4().hex}
-        supervisor = Supervisor(self.store, self.limits, self.threads, told, own=self.scheduler is None)
+        supervisor = Supervisor(self.store, self.limits, told, own=self.scheduler is None)
         with self._client(len(waiting)) as client:
             client.register_plugin(supervisor)
             dispatch = _Dispatch(client, supervisor, self.workers, waiting)
@@ -153,10 +151,9 @@ def _own_cluster(workers: int) -> Iterator[LocalCluster]:
 class Supervisor(WorkerPlugin):
     """What a worker process keeps for one run: the launcher of its children, until the run or the worker ends."""
 
-    def __init__(self, store: Store, limits: Limits, threads: int, told: dict[str, str], *, own: bool) -> None:
+    def __init__(self, store: Store, limits: Limits, told: dict[str, str], *, own: bool) -> None:
         self.store = store
         self.limits = limits
-        self.threads = threads
         self.told = told
         self.own = own
         self.name = f"rotsync-{told['run']}"
@@ -167,7 +164,7 @@ class Supervisor(WorkerPlugin):
             signal.signal(
                 signal.SIGINT, signal.SIG_IGN
             )  # Ctrl-C in a terminal reaches all; the client ends its workers
-        self.launcher = Launcher(self.threads)
+        self.launcher = Launcher(self.limits.threads)
         self.folders = WorkFolders(self.store)
         self.stop = threading.Event()
         self.lock = threading.Lock()
@@ -181,13 +178,13 @@ class Supervisor(WorkerPlugin):
         self.launcher.close()
         self.folders.close()
 
-    def run(self, jobs: Sequence[Job]) -> list[dict[str, Any]]:
+    def run(self, jobs: Sequence[Job]) -> list[Record]:
         """On the worker: run jobs in their order until the time is used up; the records of those that were run."""
         with self.lock:
             self.busy += 1
         try:
-            until = time.monotonic() + BUDGET_S
-            records: list[dict[str, Any]] = []
+            until = time.monotonic() + CHUNK_S
+            records: list[Record] = []
             while len(records) < len(jobs) and (not records or time.monotonic() < until):
                 job = jobs[len(records)]
                 records.append(self.record(job) or self._run_one(job))
@@ -198,24 +195,24 @@ class Supervisor(WorkerPlugin):
             with self.lock:
                 self.busy -= 1
 
-    def record(self, job: Job) -> dict[str, Any] | None:
+    def record(self, job: Job) -> Record | None:
         """What this run has stored of a job already, before a worker died."""
         try:
             record = self.store.record(job.id)
         except InputError:
             return None
-        return record if record is not None and record["provenance"].get("run") == self.told["run"] else None
+        return record if record is not None and record.provenance.get("run") == self.told["run"] else None
 
-    def _run_one(self, job: Job) -> dict[str, Any]:
+    def _run_one(self, job: Job) -> Record:
         if self.stop.is_set():
             raise Interrupted
         if not self.store.problem_path(job.instance_key).exists():
             raise InputError(f"the dask worker on {_host()} does not see the folder of the run, {self.store.folder}")
         method = _same_method(job)
-        return run_job(job, method, self.folders, self.launcher, self.limits, self.threads, self.stop, self.told)
+        return run_job(job, method, self.folders, self.launcher, self.limits, self.stop, self.told)
 
 
-def run_chunk(supervisor: str, jobs: Sequence[Job]) -> list[dict[str, Any]]:
+def run_chunk(supervisor: str, jobs: Sequence[Job]) -> list[Record]:
     """Run jobs on the worker that executes this; see `Supervisor.run`."""
     plugin = get_worker().plugins[supervisor]
     assert isinstance(plugin, Supervisor)
@@ -225,14 +222,13 @@ def run_chunk(supervisor: str, jobs: Sequence[Job]) -> list[dict[str, Any]]:
 _importing = threading.Lock()
 
 
-def _same_method(job: Job) -> Info:
+def _same_method(job: Job) -> MethodInfo:
     """The method of a job as this worker finds it, which must be the one that was planned."""
     try:
         with _importing:  # a worker may have several threads, and a module is there before all of it is
-            found = infos(import_origin(job.origin), "method")
+            method = method_at(job.origin, job.method)
     except Exception as error:  # a plug-in may fail in any way
         raise InputError(f"the dask worker on {_host()} cannot import {job.origin}: {error}") from error
-    method = next((info for info in found if info.name == job.method), None)
     if method is None or method.source_hash != job.source_hash:
         raise InputError(
             f"the dask worker on {_host()} has another version of '{job.method}' in {job.origin}; "
@@ -242,7 +238,7 @@ def _same_method(job: Job) -> Info:
 
 
 def _host() -> str:
-    return str(provenance.of_this_run()["host"])
+    return provenance.of_this_run()["host"]
 
 
 class _Dispatch:
@@ -289,7 +285,7 @@ class _Dispatch:
 
     def _size(self, slots: int) -> int:
         """As many jobs as fit into a chunk's time, judged by those before, but so few that all workers get some."""
-        fitting = int(BUDGET_S * self.jobs / self.seconds) if self.seconds else 1
+        fitting = int(CHUNK_S * self.jobs / self.seconds) if self.seconds else 1
         share = math.ceil(len(self.waiting) / (2 * AHEAD * slots))
         return max(1, min(fitting, share, LONGEST))
 
@@ -306,7 +302,7 @@ class _Dispatch:
         else:
             self.waiting.extendleft(reversed(cells[len(records) :]))
             self.jobs += len(records)
-            self.seconds += sum(record.get("wall_s", 0.0) for record in records)
+            self.seconds += sum(record.wall_s or 0.0 for record in records)
             yield from zip(cells, records, strict=False)
 
     def _after_deaths(self, cells: list[Cell], deaths: int) -> Iterator[Finished]:
@@ -320,9 +316,8 @@ class _Dispatch:
             else:
                 (self.suspects if len(cells) > 1 else self.accused).append(cell)
 
-    def _crashed(self, cell: Cell, deaths: int) -> dict[str, Any]:
-        ended = Outcome(outcome.CRASHED, f"{deaths} dask workers died while running it")
-        own = self.supervisor
-        record = record_of(asdict(cell.job), cell.method.requires, own.limits, own.threads, ended, {})
-        own.store.add_record(cell.job.id, record, None)
+    def _crashed(self, cell: Cell, deaths: int) -> Record:
+        ended = Ended(Outcome(outcome.CRASHED, f"{deaths} dask workers died while running it"))
+        record = ended.record(cell.job, cell.method.requires_of(cell.job.parameters), self.supervisor.limits)
+        self.supervisor.store.add_record(record, None)
         return record

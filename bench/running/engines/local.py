@@ -3,24 +3,25 @@
 import threading
 from collections.abc import Generator, Iterable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import asdict
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from bench.core import outcome
+from bench.core.limits import Limits
 from bench.core.outcome import Outcome
 from bench.execution.child import Request
-from bench.execution.job import execute, record_of
+from bench.execution.execute import Ended, execute
 from bench.execution.launch import Launcher
 from bench.execution.output import ESTIMATE_FILE
-from bench.execution.supervise import Interrupted, Limits
-from bench.plugins.declare import Info
+from bench.execution.supervise import Interrupted
+from bench.plugins.declare import MethodInfo
 from bench.running.engines.folders import WorkFolders
+from bench.storage.record import Record
 from bench.storage.store import Store
 from bench.suite.experiment import Cell
 from bench.suite.plan import Job
 
-Finished = tuple[Cell, dict[str, Any]]
+Finished = tuple[Cell, Record]
 
 
 class LocalEngine:
@@ -34,16 +35,13 @@ class LocalEngine:
         Of one job.
     workers
         How many children at a time.
-    threads
-        How many threads the numerical libraries of each child may use.
     """
 
-    def __init__(self, store: Store, limits: Limits, workers: int, threads: int) -> None:
+    def __init__(self, store: Store, limits: Limits, workers: int) -> None:
         self.store = store
         self.limits = limits
         self.workers = workers
-        self.threads = threads
-        self.launcher = Launcher(threads)
+        self.launcher = Launcher(limits.threads)
         self.stop = threading.Event()
         self.folders = WorkFolders(store)
 
@@ -72,19 +70,18 @@ class LocalEngine:
     def _run_one(self, cell: Cell) -> Finished:
         if self.stop.is_set():
             raise Interrupted
-        return cell, run_job(cell.job, cell.method, self.folders, self.launcher, self.limits, self.threads, self.stop)
+        return cell, run_job(cell.job, cell.method, self.folders, self.launcher, self.limits, self.stop)
 
 
 def run_job(
     job: Job,
-    method: Info,
+    method: MethodInfo,
     folders: WorkFolders,
     launcher: Launcher,
     limits: Limits,
-    threads: int,
     stop: threading.Event,
-    told: Mapping[str, Any] | None = None,
-) -> dict[str, Any]:
+    told: Mapping[str, str] | None = None,
+) -> Record:
     """Run one job in a supervised child and keep its record, which is returned; what every engine does.
 
     Parameters
@@ -98,14 +95,14 @@ def run_job(
         Once `stop` is set; no record is kept then.
     """
     store = folders.store
-    if method.not_installed:
-        return not_installed(job, method, store, limits, threads)
+    if method.not_installed(job.parameters):
+        return not_installed(job, method, store, limits)
     with folders.empty() as work:
-        request = request_of(job, store, work, threads)
-        ended, report = execute(request, method.requires, launcher, limits, stop)
-        record = record_of(asdict(job), method.requires, limits, threads, ended, report)
-        record["provenance"] = record["provenance"] | (told or {})
-        store.add_record(job.id, record, work / ESTIMATE_FILE if ended.kind == outcome.OK else None)
+        requires = method.requires_of(job.parameters)
+        ended = execute(request_of(job, store, work, limits.threads), requires, launcher, limits, stop)
+        record = ended.record(job, requires, limits)
+        record = replace(record, provenance={**record.provenance, **(told or {})})
+        store.add_record(record, work / ESTIMATE_FILE if ended.outcome.ok else None)
     return record
 
 
@@ -122,9 +119,9 @@ def request_of(job: Job, store: Store, folder: Path, threads: int) -> Request:
     )
 
 
-def not_installed(job: Job, method: Info, store: Store, limits: Limits, threads: int) -> dict[str, Any]:
+def not_installed(job: Job, method: MethodInfo, store: Store, limits: Limits) -> Record:
     """Keep a record, which is returned, that says what a method lacks, and how to get it."""
-    hint = Outcome(outcome.NOT_INSTALLED, method.install_hint)
-    record = record_of(asdict(job), (), limits, threads, hint, {})
-    store.add_record(job.id, record, None)
+    ended = Ended(Outcome(outcome.NOT_INSTALLED, method.install_hint(job.parameters)))
+    record = ended.record(job, (), limits)
+    store.add_record(record, None)
     return record

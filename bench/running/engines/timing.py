@@ -5,18 +5,16 @@ import itertools
 import os
 import threading
 from collections.abc import Generator, Iterable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
-from typing import Any
 
-from bench.core import outcome
-from bench.core.outcome import Outcome
-from bench.execution.job import execute, record_of
+from bench.core.limits import Limits
+from bench.execution.execute import Ended, execute
 from bench.execution.launch import Launcher
 from bench.execution.output import ESTIMATE_FILE
-from bench.execution.supervise import Limits
 from bench.running.engines.local import Finished, not_installed, request_of
+from bench.storage.record import Record
 from bench.storage.store import Store
 from bench.suite.experiment import Cell
 
@@ -31,23 +29,22 @@ class TimingEngine:
     seconds, one solution is part of the warm-up, and the round counts for the median of those that follow. Every
     second round goes through the methods backwards.
 
-    What is stored of a job: as ``round_s`` the solve seconds of its rounds, their median as ``solve_s``, the
-    smallest as ``min_s``, and as ``waited`` the largest share of a round's time in which another process had the
-    core; all else, the estimate too, is that of the first round. A job whose round does not end well ends so, and
+    What is stored of a job: as ``round_s`` the solve seconds of its rounds, their median as ``solve_s``, and as
+    ``waited`` the largest share of a round's time in which another process had the core; all else, the estimate
+    too, is that of the first round. A job whose round does not end well ends so, and
     takes no part in the rounds that follow.
 
     Parameters
     ----------
-    store, limits, threads
+    store, limits
         As of `LocalEngine`; the limits are those of one round.
     """
 
-    def __init__(self, store: Store, limits: Limits, threads: int) -> None:
+    def __init__(self, store: Store, limits: Limits) -> None:
         self.store = store
         self.limits = limits
-        self.threads = threads
         self.core = max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
-        self.launcher = Launcher(threads)
+        self.launcher = Launcher(limits.threads)
         self.stop = threading.Event()
 
     def run(self, cells: Iterable[Cell]) -> Generator[Finished, None, None]:
@@ -65,8 +62,8 @@ class TimingEngine:
         with contextlib.ExitStack() as stack:
             timed = []
             for cell in cells:
-                if cell.method.not_installed:
-                    yield cell, not_installed(cell.job, cell.method, self.store, self.limits, self.threads)
+                if cell.method.not_installed(cell.job.parameters):
+                    yield cell, not_installed(cell.job, cell.method, self.store, self.limits)
                 else:
                     timed.append(_Timed(cell, stack.enter_context(self.store.work_folder())))
             for number in range(max((cell.job.rounds for cell in cells), default=0)):
@@ -79,24 +76,23 @@ class TimingEngine:
     def _run_round(self, job: "_Timed") -> None:
         folder = job.folder / str(len(job.round_s))
         folder.mkdir()
-        request = request_of(job.cell.job, self.store, folder, self.threads)
+        request = request_of(job.cell.job, self.store, folder, self.limits.threads)
         request = replace(request, core=self.core, repeat_s=REPEAT_S)
-        ended, report = execute(request, job.cell.method.requires, self.launcher, self.limits, self.stop)
-        if ended.kind == outcome.OK:
-            job.round_s.append(median(report.pop("solves_s")))
-            job.waited = max(job.waited, report.pop("waited"))
-        if not job.report or ended.kind != outcome.OK:
-            job.ended, job.report = ended, report
+        ended = execute(request, job.requires, self.launcher, self.limits, self.stop)
+        if ended.outcome.ok:
+            job.round_s.append(median(ended.report.solves_s))
+            job.waited = max(job.waited, ended.report.waited or 0.0)
+        if job.ended is None or not ended.outcome.ok:
+            job.ended = ended
 
-    def _stored(self, job: "_Timed") -> dict[str, Any]:
-        report = dict(job.report)
-        if job.ended.kind == outcome.OK:
-            report |= {"solve_s": median(job.round_s), "min_s": min(job.round_s)}
-            report |= {"round_s": job.round_s, "waited": job.waited}
-        requires = job.cell.method.requires
-        record = record_of(asdict(job.cell.job), requires, self.limits, self.threads, job.ended, report)
-        estimate = job.folder / "0" / ESTIMATE_FILE
-        self.store.add_record(job.cell.job.id, record, estimate if job.ended.kind == outcome.OK else None)
+    def _stored(self, job: "_Timed") -> Record:
+        assert job.ended is not None
+        record = job.ended.record(job.cell.job, job.requires, self.limits)
+        ok = record.outcome.ok
+        if ok:
+            report = replace(record.report, solve_s=median(job.round_s), solves_s=(), waited=job.waited)
+            record = replace(record, report=report, round_s=tuple(job.round_s))
+        self.store.add_record(record, job.folder / "0" / ESTIMATE_FILE if ok else None)
         return record
 
 
@@ -106,13 +102,13 @@ class _Timed:
     def __init__(self, cell: Cell, folder: Path) -> None:
         self.cell = cell
         self.folder = folder
-        self.ended = Outcome(outcome.NOT_RUN)
-        self.report: dict[str, Any] = {}
+        self.requires = cell.method.requires_of(cell.job.parameters)
+        self.ended: Ended | None = None  # the first round, or the one that did not end well
         self.round_s: list[float] = []
         self.waited = 0.0
 
     @property
     def over(self) -> bool:
         """Whether there is nothing more to run."""
-        failed = self.ended.kind not in (outcome.OK, outcome.NOT_RUN)
+        failed = self.ended is not None and not self.ended.outcome.ok
         return failed or len(self.round_s) == self.cell.job.rounds

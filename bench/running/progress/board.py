@@ -6,15 +6,14 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from rich.console import Console, ConsoleOptions, Group, RenderResult
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from bench.core import outcome
 from bench.running.progress.pace import Pace, Task, remaining_s, span
+from bench.storage.record import Record
 from bench.suite.plan import Job
 
 BUSY = 50  # the ETA is computed anew when that many times what it took has gone by
@@ -88,19 +87,19 @@ class Board:
         """Seconds since the start."""
         return self._clock() - self._start
 
-    def end(self, job: Job, record: Mapping[str, Any]) -> None:
+    def end(self, job: Job, record: Record) -> None:
         """Count a job that has ended."""
         with self._lock:
             known = self._tasks[job.id]
-            self.pace.see(known, record, job.rounds)
+            self.pace.see(known, record)
             self._running.pop(job.id, None)
             self._leave(job.id)
             row = self._rows[known.configured]
             row.done += 1
-            row.failed += record["outcome"] != outcome.OK
-            if record["outcome"] == outcome.OK and record.get("solve_s") is not None:
+            row.failed += not record.outcome.ok
+            if record.outcome.ok and record.report.solve_s is not None:
                 row.solve_s[0] += 1
-                row.solve_s[1] += record["solve_s"]
+                row.solve_s[1] += record.report.solve_s
             self._start_next()
 
     def eta_s(self) -> float | None:

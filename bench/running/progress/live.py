@@ -83,8 +83,8 @@ def _live(planned: "Run", console: "Console") -> None:
         live.start(refresh=True)
         for count, (cell, record) in enumerate(planned.execute(), start=1):
             board.end(cell.job, record)
-            outcomes[record["outcome"]] += 1
-            if record["outcome"] != outcome.OK:
+            outcomes[record.outcome.kind] += 1
+            if not record.outcome.ok:
                 failures.append(_line(count, len(jobs), (cell, record)))
             if failures and time.monotonic() - printed > 1 / REFRESHES:
                 _print(console, failures)
@@ -109,10 +109,7 @@ def _print(console: "Console", lines: list[str]) -> None:
 
 def _line(count: int, total: int, finished: "Finished") -> str:
     """``12/40  instance  method  0.12 s  ok``."""
-    from bench.plugins.selection import format_selection
-
     cell, record = finished
-    job = cell.job
-    seconds = f"{record['solve_s']:.2f} s" if "solve_s" in record else ""
-    method = format_selection(job.method, job.parameters)
-    return f"{count:>4}/{total}  {job.instance:<24} {method:<32} {seconds:>10}  {record['status']}"
+    job, solve_s = cell.job, record.report.solve_s
+    seconds = f"{solve_s:.2f} s" if solve_s is not None else ""
+    return f"{count:>4}/{total}  {job.instance:<24} {job.label:<32} {seconds:>10}  {record.outcome.text}"

@@ -3,9 +3,10 @@
 import bisect
 import heapq
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+
+from bench.storage.record import Record
 
 BIN = 0.05  # of the logarithm of a size; sizes closer than that are one
 PRIOR_EXPONENT = 1.0  # time grows with size like this until the times say otherwise
@@ -85,12 +86,13 @@ class Pace:
         self._times: dict[str, dict[str, _Times]] = {}
         self._expected: dict[tuple[str, str, int | None], float | None] = {}
 
-    def see(self, task: Task, record: Mapping[str, Any], rounds: int = 0) -> None:
-        """Learn from the record of a job; one without a time teaches nothing."""
-        if "wall_s" not in record:
+    def see(self, task: Task, record: Record) -> None:
+        """Learn from the record of a job; one that took no time, because its package is missing, teaches nothing."""
+        if not record.wall_s:
             return
-        seconds = record["wall_s"] * max(rounds, 1)
-        solving = record.get("solve_s") if not rounds else None
+        rounds = record.job.rounds
+        seconds = record.wall_s * max(rounds, 1)
+        solving = record.report.solve_s if not rounds else None
         solving = seconds if solving is None else min(solving, seconds)
         self._times.setdefault(task.method, {}).setdefault(task.configured, _Times()).add(task.size, solving)
         for around in (self._around.setdefault(task.configured, []), self._around_any):

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from bench.core.errors import InputError
-from bench.plugins.selection import format_selection
 from bench.running.progress.pace import Pace, Task
 from bench.running.run import Run
 from bench.storage.store import Store
@@ -45,12 +44,13 @@ class Past:
         key = job.instance_key
         if math.isnan(self._sizes.get(key, math.nan)):
             self._sizes[key] = self._size(key)
-        return Task(job.method, format_selection(job.method, dict(job.parameters)), self._sizes[key])
+        return Task(job.method, job.label, self._sizes[key])
 
     def _read(self, store: Store, jobs: Sequence[Job], most: int) -> None:
         for job in jobs[:: -(-len(jobs) // max(most, FEWEST_RECORDS))]:
             with contextlib.suppress(InputError):  # a record that cannot be read tells nothing
-                self.pace.see(self.task(job), store.record(job.id) or {}, job.rounds)
+                if record := store.record(job.id):
+                    self.pace.see(self.task(job), record)
 
     def _size(self, key: str) -> float:
         """Bytes of the stored problem, which go with its edges; NaN where no run has stored it."""
@@ -79,5 +79,5 @@ def _jobs(store: Store) -> list[Job]:
     """Jobs that a run has planned; none where its plans cannot be read."""
     try:
         return store.jobs()
-    except (InputError, OSError, KeyError, TypeError):
+    except InputError:
         return []

@@ -184,4 +184,4 @@ def _threshold(critical: float, variance: float, freedom: float) -> float:
     """Largest difference that chance explains, from the normal quantile `critical`: Student's takes its place."""
     from scipy.special import ndtr, stdtrit
 
-    return float(stdtrit(freedom, ndtr(critical)) * np.sqrt(variance)) if variance > 0 else 0.0
+    return float(stdtrit(freedom, float(ndtr(critical))) * np.sqrt(variance)) if variance > 0 else 0.0

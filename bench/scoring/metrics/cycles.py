@@ -47,11 +47,11 @@ def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
     pairs = degree * (degree - 1)
     if not pairs.any():
         return Cycles(np.empty((0, 3), dtype=np.intp), np.empty(0))
-    middle = rng.choice(problem.n, size, p=pairs / pairs.sum())
+    middle = rng.choice(problem.n, size, p=pairs / pairs.sum()).astype(np.intp)
     first = (rng.random(size) * degree[middle]).astype(np.int64)
     second = (first + 1 + (rng.random(size) * (degree[middle] - 1)).astype(np.int64)) % degree[middle]
     one, other = graph.indptr[middle] + first, graph.indptr[middle] + second
-    a, b = graph.indices[one], graph.indices[other]
+    a, b = graph.indices[one].astype(np.intp), graph.indices[other].astype(np.intp)
     closing = np.asarray(graph[a, b]).ravel().astype(np.intp) - 1
     closed = closing >= 0
     edges = np.stack([graph.data[one] - 1, graph.data[other] - 1, closing], axis=1).astype(np.intp)[closed]

@@ -61,23 +61,13 @@ def cramer_rao_variances(problem: Problem, inliers: NDArray[np.bool_], noise: st
     return 3 * variances * np.maximum(1 - variances / 3, 0)
 
 
-def efficient_mean_deg(problem: Problem, inliers: NDArray[np.bool_], noise: str, noise_deg: float) -> float:
-    """Mean error in degrees of an estimator that attains the bound; the parameters are those of the bound.
-
-    Not a bound of Cramér and Rao's, which knows squares only: the mean over cameras of the mean length
-    sqrt(8 c_i / pi) of a Gaussian vector with covariance c_i I. Least squares attains it in the limit of small
-    noise, and by the local asymptotic minimax theorem (Hájek 1972; Le Cam) no method is better there throughout a
-    neighbourhood of the truth. It holds after chordal or Karcher's alignment; `l1`, which spends the gauge on the
-    mean error itself, comes out lower by a share of order 1 / n.
-    """
-    variances = _variances(problem, inliers, noise, noise_deg)
-    return float(np.degrees(np.sqrt(8 * variances / np.pi)).mean())
-
-
 def efficient_median_deg(problem: Problem, inliers: NDArray[np.bool_], noise: str, noise_deg: float) -> float:
-    """Median error over the cameras, in degrees, of an estimator as in `efficient_mean_deg`; NaN without connection.
+    """Median error over the cameras, in degrees, of an estimator that attains the bound, with the same parameters.
 
-    The median over the cameras of the median length of a Gaussian vector with covariance c_i I.
+    Not a bound of Cramér and Rao's, which knows squares only: the median over the cameras of the median length of a
+    Gaussian vector with covariance c_i I. Least squares attains it in the limit of small noise, and by the local
+    asymptotic minimax theorem (Hájek 1972; Le Cam) no method is better there throughout a neighbourhood of the truth.
+    It holds after chordal or Karcher's alignment. NaN without connection.
     """
     variances = _variances(problem, inliers, noise, noise_deg)
     return float(np.degrees(MAXWELL_MEDIAN * np.sqrt(np.median(variances))))

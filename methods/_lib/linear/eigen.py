@@ -25,6 +25,7 @@ LARGEST_BASIS = 20  # blocks, before a restart
 KEPT = 5  # blocks of Ritz vectors that survive a restart
 CHECKED_EVERY = 3  # products
 ROUNDING = 4 * float(np.finfo(float).eps)
+LOST = 1e-13  # of a direction; what is left of it outside a space is rounding
 
 SHIFT, SHIFT_GROWTH = 1e-10, 1000.0  # first shift, relative to the mean of the diagonal, and its factor
 SMALLEST_DIAGONAL = 1e-3  # relative to its mean, in place of smaller entries under a fraction
@@ -144,9 +145,7 @@ def smallest(
             basis[:, :kept] = basis[:, :used] @ ritz[:, :kept]
             images[:, :kept] = images[:, :used] @ ritz[:, :kept]
             used = kept
-        new = precondition(residuals)
-        for _ in range(2):
-            new = np.linalg.qr(new - basis[:, :used] @ (basis[:, :used].T @ new))[0]
+        new = _beyond(np.linalg.qr(precondition(residuals))[0], basis[:, :used])
 
 
 def leading_of_dense(matrix: Floats, count: int) -> Eigenspace:
@@ -201,9 +200,24 @@ def _orthogonalised(image: Floats, basis: Floats, coefficients: Floats) -> tuple
     """Split `image` (N, c) into basis @ coefficients (filled) and the rest: its directions, and its triangle (c, c)."""
     coefficients[:] = basis.T @ image
     following, coupling = np.linalg.qr(image - basis @ coefficients)
-    for _ in range(2):  # where a column was zero, only rounding is left after the first pass
-        following, _ = np.linalg.qr(following - basis @ (basis.T @ following))
-    return following, coupling
+    return _beyond(following, basis), coupling
+
+
+def _beyond(directions: Floats, basis: Floats) -> Floats:
+    """The orthonormal `directions` (N, c), turned out of the span of `basis` (N, k).
+
+    Where nothing but rounding lies outside, a random direction takes the place: rounding can stay in the span however
+    often it is projected out, as on graphs whose cameras are all alike.
+    """
+    rng = np.random.default_rng(basis.shape[1])
+    for _ in range(2):
+        rest = directions - basis @ (basis.T @ directions)
+        lost = np.linalg.norm(rest, axis=0) <= LOST
+        if lost.any():
+            random = rng.standard_normal((len(basis), int(lost.sum())))
+            rest[:, lost] = random - basis @ (basis.T @ random)
+        directions = np.linalg.qr(rest)[0]
+    return directions
 
 
 def _gap(values: Floats, block: int) -> float:
