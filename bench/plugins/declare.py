@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeVar, cast
 import numpy as np
 
 from bench.core.errors import InputError
-from bench.core.problem import Estimate, Floats, Instance, Problem
+from bench.core.problem import Estimate, Floats, Information, Instance, Problem
 from bench.core.program import program
 from bench.plugins.configure import configured, default_of
 from bench.plugins.source_hash import hash_of_module
@@ -168,6 +168,9 @@ def method(
     max_cameras: int | None = None,
     exact_to_deg: float = 1e-6,
     invariant_to_deg: float | None = 1e-3,
+    uses: tuple[Information, ...] = (),
+    simple_graph: bool = False,
+    depends_on_labels: bool = False,
 ) -> Callable[[T], T]:
     """Declare a frozen dataclass with a `solve` method as a method.
 
@@ -190,6 +193,14 @@ def method(
     invariant_to_deg
         How far relabelling cameras, permuting or reversing edges and turning frames may move its answer to a small
         noisy problem; None promises nothing.
+    uses
+        What it takes of what comes with the measurements: any of "weights", "precisions" and "gravity". The rest is
+        not given to it, so that a row never depends on what its table does not say.
+    simple_graph
+        Whether it needs every pair measured once; parallel edges are then fused before it sees them.
+    depends_on_labels
+        Whether its answer depends on the names of the cameras, in ways that no seed of its own governs: from the second
+        seed on they are permuted, so that the spread over seeds shows how much.
 
     Where a fact or what is required depends on the parameters, an attribute of its name overrides what is declared
     (see `Info.fact` and `Info.requires_of`).
@@ -204,6 +215,9 @@ def method(
         "max_cameras": max_cameras,
         "exact_to_deg": exact_to_deg,
         "invariant_to_deg": invariant_to_deg,
+        "uses": uses,
+        "simple_graph": simple_graph,
+        "depends_on_labels": depends_on_labels,
     }
     return _declare("method", name, title, cite, requires, facts, "solve")
 
