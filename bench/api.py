@@ -1,6 +1,6 @@
 """The door for Python users: what the command line does, with objects in place of files."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from bench.core.problem import Estimate, Floats
+    from bench.core.problem import Estimate, Floats, Information, WeightsKind
 
     Edges = NDArray[np.integer[Any]] | Sequence[Sequence[int]]
 
@@ -75,6 +75,10 @@ def solve(
     n: int | None = None,
     seed: int = 0,
     *,
+    weights_kind: "WeightsKind" = "precision",
+    precisions: "Floats | None" = None,
+    gravity: "Floats | None" = None,
+    use: "Collection[Information] | None" = None,
     supervised: bool = False,
     timeout_s: float = 3600.0,
     memory_gib: float = 16.0,
@@ -92,6 +96,10 @@ def solve(
         A selection, such as ``"method[parameter=2]"``; by default `bench.methods.DEFAULT`.
     weights
         (m,) how far each measurement is to be trusted, relative to the others.
+    weights_kind, precisions, gravity
+        What the weights are, and what else comes with the measurements; see `Problem`.
+    use
+        What the method may use of these; by default all that it can.
     n
         Number of cameras; by default up to the largest in `edges`.
     seed
@@ -115,7 +123,7 @@ def solve(
     """
     import numpy as np
 
-    from bench.core.problem import Problem, oriented
+    from bench.core.problem import Problem, reoriented
     from bench.plugins.catalog import catalog, default_method
 
     pairs = np.asarray(edges)
@@ -124,16 +132,18 @@ def solve(
     measured = np.asarray(rotations, dtype=float)
     if measured.shape != (len(pairs), 3, 3):
         raise InputError(f"rotations must have shape ({len(pairs)}, 3, 3), not {measured.shape}")
-    problem = Problem(int(pairs.max()) + 1 if n is None else n, *oriented(pairs, measured), weights)
+    turned = reoriented(pairs, measured, None if precisions is None else np.asarray(precisions, dtype=float))
+    size = int(pairs.max()) + 1 if n is None else n
+    problem = Problem(size, *turned[:2], weights, weights_kind, turned[2], gravity)
     info, parameters = catalog("method", plugins).one(method or default_method())
     if not supervised:
         from bench.execution.here import solve_here
 
-        return solve_here(info, parameters, problem, seed)
+        return solve_here(info, parameters, problem, seed, use)
     from bench.core.limits import Limits
     from bench.execution.single import SingleSolver
 
-    with SingleSolver(info, parameters, Limits(timeout_s, memory_gib)) as solver:
+    with SingleSolver(info, parameters, Limits(timeout_s, memory_gib), None if use is None else tuple(use)) as solver:
         ended, _, estimate, _ = solver.solve(problem, seed)
     if estimate is None:
         raise InputError(f"{info.name}: {ended.text}")

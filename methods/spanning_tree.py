@@ -9,7 +9,7 @@ from bench import Estimate, Problem, method
 from ._lib.graph.trees import propagated, tree_edges
 
 
-@method("spanning-tree", title="Spanning tree", requires=("scipy",))
+@method("spanning-tree", title="Spanning tree", uses=("weights",), requires=("scipy",))
 @dataclass(frozen=True)
 class SpanningTree:
     """Fits n - 1 edges exactly and ignores the rest; the usual start of local methods.

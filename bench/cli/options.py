@@ -4,9 +4,12 @@ import shutil
 import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from bench.core.problem import Information
 
 
 class Align(StrEnum):
@@ -52,6 +55,14 @@ PluginOption = Annotated[
     list[Path] | None,
     typer.Option("--plugin", metavar="FILE", help="Python file with more methods or datasets."),
 ]
+UseOption = Annotated[
+    str | None,
+    typer.Option(
+        "--use",
+        metavar="WHAT",
+        help="Of what comes with the measurements: weights,precisions,gravity or none.  [default: what a method can]",
+    ),
+]
 DataDirOption = Annotated[
     Path | None, typer.Option("--data-dir", metavar="DIR", help="Folder where data are looked for first.")
 ]
@@ -88,6 +99,22 @@ def show(table: tuple[str, tuple[str, ...]]) -> None:
     typer.echo(text, nl=not text.endswith("\n"))
     for note in notes:
         typer.echo(note, err=True)
+
+
+def used(given: str | None) -> "tuple[Information, ...] | None":
+    """What ``--use`` allows; None where it was not given."""
+    from bench.core.errors import InputError, suggestion
+    from bench.core.problem import INFORMATION
+
+    if given is None:
+        return None
+    names = [] if given == "none" else given.split(",")
+    for name in names:
+        if name not in INFORMATION:
+            raise InputError(
+                f"--use takes {','.join(INFORMATION)} or none, not '{name}'{suggestion(name, INFORMATION)}"
+            )
+    return tuple(name for name in INFORMATION if name in names)
 
 
 def run_folder(given: Path) -> Path:

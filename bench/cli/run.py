@@ -13,7 +13,9 @@ from bench.cli.options import (
     PluginOption,
     ProtocolOption,
     Rerun,
+    UseOption,
     console,
+    used,
     wear,
 )
 from bench.core.program import program
@@ -54,6 +56,7 @@ def run(
     ] = None,
     timeout: Annotated[float | None, typer.Option(metavar="S", help="Wall clock seconds of one job.")] = None,
     memory: Annotated[float | None, typer.Option(metavar="GIB", help="Resident memory of one job.")] = None,
+    use: UseOption = None,
     protocol: ProtocolOption = None,
     align: AlignOption = Align.L1,
     timing: Annotated[
@@ -93,6 +96,7 @@ def run(
         threads=threads,
         timeout_s=timeout,
         memory_gib=memory,
+        use=used(use),
         protocol=protocol,
         rerun=rerun.value,
         timing=timing,

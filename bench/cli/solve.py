@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import PluginOption
+from bench.cli.options import PluginOption, UseOption, used
 
 
 def solve(
@@ -16,6 +16,7 @@ def solve(
     timeout: Annotated[float, typer.Option(metavar="SECONDS")] = 3600,
     memory: Annotated[float, typer.Option(metavar="GIB")] = 16,
     threads: Annotated[int, typer.Option(help="Threads of the numerical libraries.")] = 1,
+    use: UseOption = None,
     plugin: PluginOption = None,
 ) -> None:
     """Solve one graph with one method and write the absolute rotations (world to camera)."""
@@ -29,7 +30,7 @@ def solve(
     write = rotations_writer(out, loaded)
     problem = loaded.problem
     typer.echo(f"{graph}: {problem.n} cameras, {problem.m} edges")
-    with SingleSolver(*chosen, Limits(timeout, memory, threads)) as solver:
+    with SingleSolver(*chosen, Limits(timeout, memory, threads), used(use)) as solver:
         ended, report, estimate, _ = solver.solve(problem, seed)
     for note in (*loaded.notes, *report.notes):
         typer.echo(f"note: {note}")

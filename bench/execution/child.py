@@ -26,7 +26,7 @@ import numpy as np
 from bench.core import outcome
 from bench.core.errors import described
 from bench.core.outcome import Outcome
-from bench.core.problem import Estimate, Problem, Skipped
+from bench.core.problem import Estimate, Information, Problem, Skipped
 from bench.core.seeds import stream
 from bench.execution.given import Given
 from bench.execution.output import ESTIMATE_FILE, RESULT_FILE, Result
@@ -56,6 +56,8 @@ class Request:
         How many threads the numerical libraries may use.
     folder
         Where the results go.
+    use
+        What the method may use of what came with the measurements; None for all.
     core
         The one core that the process may use; None for all.
     repeat_s
@@ -72,6 +74,7 @@ class Request:
     seed: int
     threads: int
     folder: str
+    use: tuple[Information, ...] | None = None
     core: int | None = None
     repeat_s: float = 0.0
     warm_up: bool = True
@@ -138,7 +141,8 @@ def solve(request: Request, prepared: Prepared) -> Result:
     if request.warm_up and hasattr(method, "warm_up"):
         method.warm_up()
 
-    given = Given.of(problem)
+    given = Given.of(problem, info, method, request.use, request.seed)
+    used = tuple(sorted(given.problem.carries))
     pristine = copy.copy(given.problem)  # what a solution caches in its problem, the next one must not find
     memory = _PeakMemory()
     processor = time.process_time()
@@ -147,7 +151,7 @@ def solve(request: Request, prepared: Prepared) -> Result:
     if os.getpid() != process:
         os._exit(0)  # the method forked, and did not keep the other from returning here
     processor = time.process_time() - processor
-    report = dataclasses.replace(report, peak_mib=memory.peak_mib(), solve_s=elapsed)
+    report = dataclasses.replace(report, peak_mib=memory.peak_mib(), solve_s=elapsed, used=used)
     wrong = what_is_wrong(pristine, estimate, elapsed)
     if wrong:
         return Result(Outcome(outcome.INVALID_OUTPUT, wrong), report)

@@ -1,58 +1,91 @@
 """What a method is given of a problem, and its estimate put back into the whole."""
 
-import dataclasses
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core.problem import Estimate, Floats, Problem
+from bench.core.fusion import fused
+from bench.core.problem import Estimate, Floats, Information, Problem
+from bench.core.seeds import stream
+from bench.plugins.declare import Method, MethodInfo
 
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """The connected part of a problem that a method is to solve.
+    """The part of a problem that a method is to solve.
 
     Parameters
     ----------
     whole, problem
-        The problem, and what is given of it: its largest component.
+        The problem, and what is given of it: its largest component, with what the method uses of what came with the
+        measurements.
     cameras
-        (k,) the cameras of the whole that are given.
-    edges
-        (m,) whether each edge of the whole is given.
+        (k,) the cameras of the whole that are given, in the order in which they are.
+    edges, place
+        (m,) whether each edge of the whole is given, and for each of these its edge in `problem`.
+    notes
+        What a reader of the estimate must know of that.
     """
 
     whole: Problem
     problem: Problem
     cameras: NDArray[np.intp]
     edges: NDArray[np.bool_]
+    place: NDArray[np.intp]
+    notes: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, whole: Problem) -> "Given":
-        """What is given of a problem; the problem itself where that is connected."""
+    def of(
+        cls, whole: Problem, info: MethodInfo, method: Method, use: Collection[Information] | None, seed: int
+    ) -> "Given":
+        """What a method is given.
+
+        Parameters
+        ----------
+        info, method
+            The method, and as it is configured.
+        use
+            What it may use of what came with the measurements; None for all.
+        seed
+            From 1 on, the cameras of a method that depends on their names have other names.
+        """
+        uses = info.fact("uses", method)
+        problem = whole.keeping([name for name in uses if use is None or name in use])
         cameras = np.flatnonzero(whole.components == 0)
-        if len(cameras) == whole.n:
-            return cls(whole, whole, cameras, np.ones(whole.m, bool))
-        part, edges = whole.subgraph(cameras)
-        return cls(whole, part, cameras, edges)
+        notes: tuple[str, ...] = ()
+        if len(cameras) < whole.n:
+            notes += (f"disconnected graph: solved on its largest component, {len(cameras)} of {whole.n} cameras",)
+        if seed and info.fact("depends_on_labels", method):
+            cameras = stream(seed, "labels").permutation(cameras)
+        if np.array_equal(cameras, np.arange(whole.n)):
+            edges = np.ones(whole.m, bool)
+        else:
+            problem, edges = problem.subgraph(cameras)
+        place = np.arange(problem.m)
+        if info.fact("simple_graph", method) and problem.has_parallel_edges:
+            count = problem.m
+            problem, place = fused(problem)
+            notes += (f"{count} measurements of {problem.m} pairs: those of one pair made one, their geodesic median",)
+        return cls(whole, problem, cameras, edges, place, notes)
 
     def restored(self, estimate: Estimate) -> Estimate:
         """The estimate for the whole graph, NaN for what was not given."""
-        if self.problem is self.whole:
-            return estimate
         weights = estimate.edge_weights
-        note = f"disconnected graph: solved on its largest component, {len(self.cameras)} of {self.whole.n} cameras"
-        return dataclasses.replace(
+        if weights is not None:
+            weights = _spread(np.asarray(weights)[self.place], self.whole.m, self.edges)
+
+        def of_all(rotations: Floats) -> Floats:
+            return _spread(rotations, self.whole.n, self.cameras)
+
+        return replace(
             estimate,
-            rotations=_spread(estimate.rotations, self.whole.n, self.cameras),
-            edge_weights=None if weights is None else _spread(np.asarray(weights), self.whole.m, self.edges),
-            checkpoints=tuple(
-                dataclasses.replace(c, rotations=_spread(c.rotations, self.whole.n, self.cameras))
-                for c in estimate.checkpoints
-            ),
-            notes=(*estimate.notes, note),
+            rotations=of_all(estimate.rotations),
+            edge_weights=weights,
+            checkpoints=tuple(replace(c, rotations=of_all(c.rotations)) for c in estimate.checkpoints),
+            notes=(*estimate.notes, *self.notes),
         )
 
 

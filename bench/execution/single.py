@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Self
 from bench.core import outcome
 from bench.core.limits import Limits
 from bench.core.outcome import Outcome
-from bench.core.problem import Estimate, Problem
+from bench.core.problem import Estimate, Information, Problem
 from bench.execution.child import Request
 from bench.execution.execute import Ended, execute
 from bench.execution.launch import Launcher
@@ -41,12 +41,21 @@ class SingleSolver:
         The method and the parameters given.
     limits
         Of each problem.
+    use
+        What it may use of what comes with the measurements; None for all.
     """
 
-    def __init__(self, info: MethodInfo, parameters: Mapping[str, Any], limits: Limits) -> None:
+    def __init__(
+        self,
+        info: MethodInfo,
+        parameters: Mapping[str, Any],
+        limits: Limits,
+        use: tuple[Information, ...] | None = None,
+    ) -> None:
         self.info = info
         self.parameters = dict(parameters)
         self.limits = limits
+        self.use = use
         self.launcher = Launcher(limits.threads)
         self._warm_up = True
 
@@ -65,7 +74,7 @@ class SingleSolver:
             return Answer(Outcome(outcome.NOT_INSTALLED, hint), Report(), None)
         with tempfile.TemporaryDirectory(prefix="rotsync-") as name:
             request = request_in(Path(name), self.info, self.parameters, problem, seed, self.limits.threads)
-            request = replace(request, warm_up=self._warm_up)
+            request = replace(request, warm_up=self._warm_up, use=self.use)
             self._warm_up = False
             requires = self.info.requires_of(self.parameters)
             ended = execute(request, requires, self.launcher, self.limits, threading.Event())

@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +47,7 @@ class Repetition:
     def supervised(self) -> Answer:
         """Run it in a child process, within the limits of the record."""
         job = self.record.job
-        with SingleSolver(self.method, job.parameters, self.record.limits) as solver:
+        with SingleSolver(self.method, job.parameters, self.record.limits, job.use) as solver:
             return solver.solve(self.problem, job.seed)
 
     def in_this_process(self) -> Answer:
@@ -56,6 +56,7 @@ class Repetition:
         with tempfile.TemporaryDirectory(prefix="rotsync-") as name:
             folder = Path(name)
             request = request_in(folder, self.method, job.parameters, self.problem, job.seed, threads)
+            request = replace(request, use=job.use)
             result = child.solve(request, child.prepare(request))
             return answer(Ended(result.outcome, result.report), folder)
 

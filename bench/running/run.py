@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from bench.core import outcome
 from bench.core.errors import InputError
 from bench.core.limits import Limits
+from bench.core.problem import Information
 from bench.core.program import program
 from bench.plugins.catalog import catalog
 from bench.running.engines.local import Finished, LocalEngine
@@ -44,6 +45,8 @@ class Options:
         Override the suite's.
     jobs, threads
         How many jobs at a time, and how many threads the numerical libraries of each may use (by default one).
+    use
+        What methods may use of what comes with the measurements; None for all that they can.
     protocol
         Override the protocol of every dataset that has one.
     rerun
@@ -70,6 +73,7 @@ class Options:
     threads: int | None = None
     timeout_s: float | None = None
     memory_gib: float | None = None
+    use: tuple[Information, ...] | None = None
     protocol: str | None = None
     rerun: Rerun = "never"
     timing: bool = False
@@ -226,6 +230,7 @@ def _resolved(
         data_dir=options.data_dir,
         protocol=options.protocol,
         timing=options.timing,
+        use=options.use,
     )
 
 

@@ -42,7 +42,7 @@ SOURCES = (
     "scoring/metrics/roc.py",
 )
 
-_TEXT = ("protocol", "outcome", "status", "stop_reason", "notes")
+_TEXT = ("protocol", "outcome", "status", "stop_reason", "used", "offered", "notes")
 _WHOLE = ("n_scored", "n_cameras", "n_edges", "n_solved", "n_checkpoints")
 _NUMBERS = (
     *("mean_deg", "median_deg", "rms_deg", "p90_deg", "max_deg"),

@@ -15,6 +15,7 @@ from bench.plugins.selection import format_parameters, label, parse
 from bench.scoring.cache import Scores, scores_of
 from bench.scoring.inference.seed_ties import MANY_SEEDS, tied_by_seed
 from bench.scoring.inference.statistics import tied
+from bench.scoring.information import notes_on_use
 from bench.scoring.metrics.errors import summary
 from bench.scoring.metrics.oracle import ORACLE, Curve, curve
 from bench.scoring.metrics.speedup import speedup
@@ -30,7 +31,7 @@ Configured = tuple[str, str]
 PLACE = ["dataset", "instance", "protocol"]
 CONFIGURED = ["method", "params"]
 TIMES = ["round_s", "min_s", "waited"]
-HIDDEN = ["stamp", "n_checkpoints", "has_truth", "instance_notes"]  # what is known of a job besides its row
+HIDDEN = ["stamp", "n_checkpoints", "has_truth", "offered", "instance_notes"]  # what is known of a job besides its row
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,7 @@ def score(
             raise InputError(f"no instance of this run has the protocol '{protocol}'{suggestion(protocol, set(found))}")
         jobs, scores = list(itertools.compress(jobs, fits)), scores.where(fits)
     frame = _frame(jobs, scores.table, rule)
+    used = notes_on_use(frame, scores.table["offered"].to_pandas())
     errors = CameraErrors(frame, scores)
     ties = {place: _ties(errors, place, frame) for place in errors}
     if "round_s" in frame:
@@ -114,7 +116,12 @@ def score(
             curves.setdefault(place, {}).setdefault(method, []).append(one)
         if oracle:
             frame = _with_oracle(frame, along)
-    footnotes = [*_instance_notes(frame, scores.table), *scores.unreadable, *(plans[-1].missing if plans else ())]
+    footnotes = [
+        *_instance_notes(frame, scores.table),
+        *used,
+        *scores.unreadable,
+        *(plans[-1].missing if plans else ()),
+    ]
     return Results(frame, errors, ties, tuple(footnotes), rule, curves, JobErrors(scores))
 
 

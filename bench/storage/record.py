@@ -28,6 +28,8 @@ class Report:
 
     Parameters
     ----------
+    used
+        What it used of what came with the measurements, such as weights.
     threads, core
         How many threads the numerical libraries had, and the one core that the child was pinned to, if any.
     solve_s, conversion_s
@@ -45,6 +47,7 @@ class Report:
         had the core.
     """
 
+    used: tuple[str, ...] = ()
     threads: int | None = None
     core: int | None = None
     solve_s: float | None = None

@@ -9,6 +9,7 @@ from typing import Any
 from bench.core import typed
 from bench.core.digest import digest
 from bench.core.errors import InputError, shown, suggestion
+from bench.core.problem import Information
 from bench.formats import toml_file
 from bench.plugins import selection
 from bench.plugins.catalog import Catalog
@@ -127,6 +128,7 @@ def resolve(
     data_dir: Path | None = None,
     protocol: str | None = None,
     timing: bool = False,
+    use: tuple[Information, ...] | None = None,
 ) -> Experiment:
     """Expand a suite into cells, instance by instance; the jobs of a timing run are not those of an ordinary one.
 
@@ -150,7 +152,7 @@ def resolve(
                     names = missing.setdefault((info.name, source.how(info.name)), [])
                     names += [source.name] if source.name not in names else []
                 elif source.seeded or seed == 0:
-                    cells += _cells_of(source, info, configured, label, seed, suite.seeds, chosen, rounds)
+                    cells += _cells_of(source, info, configured, label, seed, suite.seeds, chosen, rounds, use)
     sentences = (_absence(dataset, names, command) for (dataset, command), names in missing.items())
     unique = {cell.job.id: cell for cell in cells}  # a suite may name the same twice
     return Experiment(suite, tuple(unique.values()), tuple(sentences))
@@ -176,17 +178,20 @@ def _cells_of(
     seeds: int,
     methods: Iterable[tuple[MethodInfo, dict[str, Any]]],
     rounds: int,
+    use: tuple[Information, ...] | None,
 ) -> list[Cell]:
     """Cells of one instance. On data that no seed changes, a deterministic method needs one seed only."""
     key = instance_key(dataset, configured, source)
     cells = []
     for info, parameters in methods:
         configured_method = info.configure(parameters)
-        repeated = not source.seeded and not info.fact("deterministic", configured_method)
+        varies = not info.fact("deterministic", configured_method) or info.fact("depends_on_labels", configured_method)
+        repeated = not source.seeded and varies
+        refused = [] if use is None else sorted(set(info.fact("uses", configured_method)) - set(use))
         complete, source_hash = parameters_of(configured_method), info.source_hash
         for method_seed in range(seeds) if repeated else (seed,):
             timed = [rounds] if rounds else []
-            identity = digest([IDENTITY, key, info.name, complete, source_hash, method_seed, *timed])
+            identity = digest([IDENTITY, key, info.name, complete, source_hash, method_seed, *timed, *refused])
             job = Job(
                 identity,
                 label,
@@ -200,6 +205,7 @@ def _cells_of(
                 rounds,
                 source_hash,
                 dataset.origin,
+                use,
             )
             cells.append(Cell(job, source, info))
     return cells

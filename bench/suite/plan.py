@@ -7,6 +7,7 @@ from typing import Any
 
 from bench.core import typed
 from bench.core.errors import InputError
+from bench.core.problem import Information
 from bench.plugins.selection import Value, format_selection
 
 
@@ -28,6 +29,8 @@ class Job:
         How often a timing run times it; zero for the job of an ordinary run.
     source_hash, dataset_origin
         Hash of the method's source, and the module or file that the dataset is in.
+    use
+        What the method may use of what comes with the measurements; None for all that it can.
     """
 
     id: str
@@ -42,6 +45,7 @@ class Job:
     rounds: int = 0
     source_hash: str = ""
     dataset_origin: str = ""
+    use: tuple[Information, ...] | None = None
 
     def __post_init__(self) -> None:
         """Refuse keys that would lead out of the folder of a run: they are names of files."""
@@ -112,6 +116,7 @@ class _Configured:
     origin: str
     parameters: Mapping[str, Value]
     source_hash: str
+    use: tuple[Information, ...] | None
 
 
 @dataclass(frozen=True)
@@ -146,10 +151,10 @@ def encode(plan: Plan) -> dict[str, Any]:
     rows = []
     for job in plan.jobs:
         place = _Place(job.dataset, job.instance, job.instance_key, job.dataset_origin)
-        spelled = (job.method, job.title, job.origin, job.source_hash, json.dumps(dict(job.parameters)))
+        spelled = (job.method, job.title, job.origin, job.source_hash, job.cell[3], str(job.use))
         if spelled not in methods:
             methods[spelled] = len(methods)
-            configured.append(_Configured(job.method, job.title, job.origin, job.parameters, job.source_hash))
+            configured.append(_Configured(job.method, job.title, job.origin, job.parameters, job.source_hash, job.use))
         rows.append((job.id, places.setdefault(place, len(places)), methods[spelled], job.seed, job.rounds))
     columns = _Columns(*map(tuple, zip(*rows, strict=True))) if rows else _Columns((), (), (), (), ())
     written = _Written(plan.suite, plan.command, plan.baseline, plan.missing, tuple(places), tuple(configured), columns)

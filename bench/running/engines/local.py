@@ -116,6 +116,7 @@ def request_of(job: Job, store: Store, folder: Path, threads: int) -> Request:
         seed=job.seed,
         threads=threads,
         folder=str(folder.resolve()),
+        use=job.use,
     )
 
 
