@@ -9,9 +9,10 @@ from bench.core.problem import Floats
 LADDER_DEG = (0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 5.0, 10.0, 15.0)
 FITS = 0.1  # of the residuals, at least, within the tolerance for a reading that explains the data
 BETTER = 1.5  # so many times as many of them, at least, as for the data as they are
-DEVIATIONS = 4.0  # standard errors by which it must be better on average
+DEVIATIONS = 4.0  # standard errors by which it is better on average; with half of them, twice as many must fit
 CHANCE = 1e-4  # that any of the readings tried fits so well by accident
 APART = 3.0  # tolerances from which on a residual does not fit
+FEWEST = 3  # edges that fit only transposed, below which they may be wrong by themselves
 MIXED = 0.1  # of what fits, from which on both directions are mixed
 FLOOR_DEG = 0.01  # residuals below do not tell readings apart
 
@@ -63,15 +64,17 @@ def contrast(
         Share of the residuals within the tolerance that a reading needs.
     """
     better = logs(given) - logs(best)
-    if better.mean() < DEVIATIONS * better.std() / np.sqrt(independent):
+    surely, hardly = (better.mean() >= k * better.std() / np.sqrt(independent) for k in (DEVIATIONS, DEVIATIONS / 2))
+    if not hardly:
         return None
+    times = BETTER if surely else 2 * BETTER
     found: list[Contrast] = []
     for tolerance in LADDER_DEG:
         at = Contrast.at(tolerance, given, best)
         hits = int(at.best * independent + 1e-9)
         if (
             at.best >= fits
-            and BETTER * at.given <= at.best
+            and times * at.given <= at.best
             and significant(hits, independent, _chance(null, tolerance), tries)
         ):
             found.append(at)
@@ -92,7 +95,11 @@ def mixture(kept: Floats, turned: Floats, null: Floats) -> float:
     for tolerance in LADDER_DEG:
         one = int(((kept <= tolerance) & (turned > APART * tolerance)).sum())
         other = int(((turned <= tolerance) & (kept > APART * tolerance)).sum())
-        if one + other >= FITS * len(kept) and significant(other, len(kept), _chance(null, tolerance)):
+        if (
+            other >= FEWEST
+            and one + other >= FITS * len(kept)
+            and significant(other, len(kept), _chance(null, tolerance))
+        ):
             best = max(best, other / (one + other))
     return best if best >= MIXED else 0.0
 
