@@ -14,7 +14,7 @@ from bench.core.problem import Floats
 from bench.datasets.folded import Folded
 from bench.methods.l1_irls import L1IRLS
 from bench.methods.spectral import Spectral
-from bench.scoring.metrics.folds import Fold, border, find_folds, shared_folds
+from bench.scoring.metrics.folds import SMALLEST, Fold, border, find_folds, shared_folds
 
 A_QUARTER = Folded(outliers=0.0)  # every outlier is an edge across, which tells who is in the part
 TURN = so3.exp(np.radians(25) * np.array([0.6, 0, 0.8]))
@@ -158,9 +158,30 @@ def test_estimates_at_random_and_tiny_ones_raise_no_alarm() -> None:
     for seed in range(5):
         truth, estimate = estimated(seed, 200, 1.0, lost=1.0)
         assert find_folds(estimate, truth) == ()
-    truth, estimate = estimated(0, 20, 0.1)
-    assert find_folds(folded(estimate, truth, np.arange(8)), truth) == ()
+    truth, estimate = estimated(0, SMALLEST - 1, 0.1)
+    assert find_folds(folded(estimate, truth, np.arange(6)), truth) == ()
     assert find_folds(np.full_like(truth, np.nan), truth) == ()
+
+
+@pytest.mark.parametrize(("n", "size"), [(30, 10), (30, 6), (20, 7), (16, 6)])
+@pytest.mark.parametrize("angle_deg", [25, 180])
+def test_a_fold_of_a_small_scene_is_found(n: int, size: int, angle_deg: float) -> None:
+    turn = so3.exp(np.radians(angle_deg) * np.array([0.6, 0, 0.8]))
+    for seed in range(5):
+        truth, estimate = estimated(seed, n, 0.5)
+        (fold,) = find_folds(folded(estimate, truth, np.arange(n - size, n), turn), truth)
+        np.testing.assert_array_equal(fold.cameras, np.arange(n - size, n))
+        assert fold.angle_deg == pytest.approx(angle_deg, abs=2)
+
+
+@pytest.mark.parametrize("freedom", [np.inf, 2, 1])
+@pytest.mark.parametrize("lost", [0, 0.3, 0.6])
+def test_small_scenes_raise_no_alarm(freedom: float, lost: float) -> None:
+    for seed in range(5):
+        for n in (SMALLEST, 20, 31):
+            for noise_deg in (0.3, 8):
+                truth, estimate = estimated(seed, n, noise_deg, freedom, lost)
+                assert find_folds(estimate, truth) == ()
 
 
 def test_folds_of_several_methods_are_put_together() -> None:

@@ -5,7 +5,16 @@ import numpy as np
 from bench.reporting.html import words
 from bench.reporting.html.case import Case, Solved
 from bench.reporting.html.section import Section, Table, Value, anchor
-from bench.scoring.metrics.folds import MIN_ANGLE_DEG, MIN_SHARE, Fold, Ids, SharedFold, border, shared_folds
+from bench.scoring.metrics.folds import (
+    MIN_ANGLE_DEG,
+    SMALLEST,
+    Fold,
+    Ids,
+    SharedFold,
+    border,
+    shared_folds,
+    smallest_fold,
+)
 
 LISTED = 200  # cameras
 ALIKE_DEG = 2.0  # a range of angles that is told as one
@@ -23,17 +32,30 @@ def fold_section(case: Case) -> list[Section]:
     name = anchor("folds", case.name)
     shared = shared_folds({solved.label: solved.folds for solved in case.solved})
     if not shared:
-        nothing = (
-            f"None: in no estimate do {100 * MIN_SHARE:g} % of the cameras or more share one wrong rotation of at "
-            f"least {MIN_ANGLE_DEG:g}°."
-        )
-        return [Section(name, TITLE, (nothing,))]
+        return [Section(name, TITLE, (_nothing(_scored(case)),))]
     sentences = [sentence for part in shared for sentence in _sentences(case, part)]
     return [Section(name, TITLE, (*sentences, ALIGNMENT), None, (_table(case, shared),))]
 
 
+def _scored(case: Case) -> int:
+    return max(int(np.isfinite(solved.errors).sum()) for solved in case.solved)
+
+
+def _nothing(scored: int) -> str:
+    """What was looked for in vain, or why nothing was."""
+    if scored < SMALLEST:
+        return (
+            f"Not looked for: {scored} cameras are scored, and of fewer than {SMALLEST} a part that is turned cannot "
+            "be told from cameras that are wrong one by one."
+        )
+    return (
+        f"None: in no estimate do {smallest_fold(scored)} or more of the {scored} scored cameras share one wrong "
+        f"rotation of at least {MIN_ANGLE_DEG:g}°."
+    )
+
+
 def _sentences(case: Case, part: SharedFold[str]) -> list[str]:
-    scored = max(int(np.isfinite(solved.errors).sum()) for solved in case.solved)
+    scored = _scored(case)
     size = len(part.cameras)
     what = f"{size} of {scored} cameras ({100 * size / scored:.0f} %) are turned as one piece {_angles(part)}"
     return [f"{_whose(case, part)}, {what}. {_cause(case, part)}", f"Cameras: {_ids(part.cameras)}."]

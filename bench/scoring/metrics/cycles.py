@@ -1,6 +1,7 @@
 """How well the measurements close around triangles, and whether wrong ones agree with each other."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,11 @@ def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
         How many paths are drawn; those that do not close are not replaced.
     """
     rng = np.random.default_rng(0)
-    graph = problem.adjacency(np.arange(1.0, problem.m + 1))  # its values name the edges
+    pair = problem.edges[:, 0].astype(np.int64) * problem.n + problem.edges[:, 1]
+    _, once = np.unique(pair, return_index=True)  # of parallel edges the first
+    names = np.zeros(problem.m)
+    names[once] = once + 1.0
+    graph = problem.adjacency(names)  # its values name the edges
     degree = np.diff(graph.indptr).astype(np.int64)
     pairs = degree * (degree - 1)
     if not pairs.any():
@@ -83,7 +88,7 @@ def agreeing_share(cycles: Cycles, at_truth: Floats) -> float:
     return min(1.0, 2 * float(closing.mean()))
 
 
-def _directed(problem: Problem, edges: NDArray[np.intp], start: NDArray[np.intp], end: NDArray[np.intp]) -> Floats:
+def _directed(problem: Problem, edges: NDArray[np.intp], start: NDArray[Any], end: NDArray[Any]) -> Floats:
     """Measured rotations (k, 3, 3) of edges, transposed where they are stored from `end` to `start`."""
     stored = problem.rotations[edges]
     return np.where((start < end)[:, None, None], stored, np.swapaxes(stored, -1, -2))

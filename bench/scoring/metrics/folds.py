@@ -21,6 +21,8 @@ Ids = NDArray[np.intp]
 
 MIN_SHARE = 0.02
 MIN_SIZE = 8
+SMALL, SMALLEST = 4 * MIN_SIZE, 16  # scored cameras: below the one, other limits hold; below the other, none are sought
+MIN_SIZE_SMALL = 6
 MIN_ANGLE_DEG = 3.0
 SAME = 0.5  # of the cameras of two folds together, from which on they are one and the same
 
@@ -106,7 +108,8 @@ def find_folds(rotations: Floats, truth: Floats) -> tuple[Fold, ...]:
     - half-way to the largest mode there are at most `DIP` times as many cameras as at the mode itself,
     - a locally even density would put as many of the cameras around it within two radii with a probability below
       `CHANCE` (binomial; small, because a mode is the best of many places), and
-    - it has at least `MIN_SIZE` cameras and `MIN_SHARE` of all.
+    - it has at least `MIN_SIZE` cameras and `MIN_SHARE` of all, or `MIN_SIZE_SMALL` of fewer than `SMALL`; there the
+      probability may be larger by as much as fewer cameras are fewer places.
 
     Every camera then goes to the nearest of the modes found, unless it is far from all of them.
 
@@ -120,13 +123,13 @@ def find_folds(rotations: Floats, truth: Floats) -> tuple[Fold, ...]:
     Returns
     -------
     tuple
-        Empty where fewer than four times `MIN_SIZE` cameras are scored.
+        Empty where fewer than `SMALLEST` cameras are scored.
     """
     scored = np.flatnonzero(np.isfinite(rotations).all(axis=(1, 2)) & np.isfinite(truth).all(axis=(1, 2)))
-    if len(scored) < 4 * MIN_SIZE:
+    if len(scored) < SMALLEST:
         return ()
     turned = np.swapaxes(truth[scored], -1, -2) @ rotations[scored]
-    modes = _main_and_folds(turned, max(MIN_SIZE, int(np.ceil(MIN_SHARE * len(scored)))))
+    modes = _main_and_folds(turned, smallest_fold(len(scored)))
     if len(modes) < 2:
         return ()
     members = _members(turned, modes)
@@ -136,7 +139,14 @@ def find_folds(rotations: Floats, truth: Floats) -> tuple[Fold, ...]:
         Fold(scored[own], centre @ centres[0].T, len(own) / len(scored), spread, spreads[0])
         for own, centre, spread in zip(members[1:], centres[1:], spreads[1:], strict=True)
     ]
+    if len(scored) < SMALL:  # so few may gather anywhere along errors about one axis
+        folds = [fold for fold in folds if fold.angle_deg >= REACH * max(fold.main_spread_deg, fold.spread_deg)]
     return tuple(sorted(folds, key=lambda fold: -len(fold.cameras)))
+
+
+def smallest_fold(scored: int) -> int:
+    """Of how many cameras a fold must be, where so many are scored."""
+    return MIN_SIZE_SMALL if scored < SMALL else max(MIN_SIZE, int(np.ceil(MIN_SHARE * scored)))
 
 
 def shared_folds(folds: Mapping[Key, Sequence[Fold]]) -> list[SharedFold[Key]]:
@@ -254,7 +264,8 @@ def _genuine(mode: _Mode, main: _Mode, turned: Floats, least: int) -> bool:
     around = int(((from_mode < 4 * mode.radius) & (from_mode < from_main)).sum())
     within = int(((from_mode < 2 * mode.radius) & (from_mode < from_main)).sum())
     volume = 1 / 8  # of the ball of two radii in that of four
-    return (float(bdtrc(within - 1, around, volume)) if within < around else volume**within) < CHANCE
+    chance = CHANCE * (SEEDS / len(turned) if len(turned) < SMALL else 1)  # there are fewer places to be the best of
+    return (float(bdtrc(within - 1, around, volume)) if within < around else volume**within) < chance
 
 
 def _members(turned: Floats, modes: list[_Mode]) -> list[Ids]:
