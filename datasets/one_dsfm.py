@@ -146,14 +146,14 @@ def _load(folder: Path, protocol: Protocol, identity: str) -> Instance:
     truth = _truth(folder, graph)
     notes = (*graph.notes, *_truth_notes(folder.name, truth))
     problem = graph.problem
-    core = problem
+    core, ids = problem, graph.cameras
     if truth is not None:
         with_truth = np.flatnonzero(np.isfinite(truth).all(axis=(1, 2)))
         if not np.isin(problem.edges, with_truth).all(axis=1).any():
             raise InputError(f"{folder / BUNDLE}: no edge joins two cameras with ground truth")
         core, _ = problem.subgraph(with_truth)
         if protocol == "truth-subgraph":
-            problem, truth = core, truth[with_truth]
+            problem, truth, ids = core, truth[with_truth], ids[with_truth]
     return Instance(
         problem,
         truth,
@@ -163,6 +163,7 @@ def _load(folder: Path, protocol: Protocol, identity: str) -> Instance:
         revision=identity,
         notes=notes,
         statistics=statistics(problem, hardness_of=core),
+        ids=ids,
     )
 
 

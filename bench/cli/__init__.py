@@ -25,6 +25,7 @@ from bench.cli import (
     report,
     rerun,
     run,
+    score,
     solve,
     table,
 )
@@ -69,6 +70,7 @@ app.command("bibtex")(bibtex.bibtex)
 app.command("map")(map.map_)
 app.add_typer(data.app, name="data")
 app.command("solve")(solve.solve)
+app.command("score")(score.score)
 app.command("new")(new.new)
 app.command("check")(check.check)
 

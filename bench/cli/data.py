@@ -42,6 +42,7 @@ def inspect(name: Name, data_dir: DataDirOption = None, protocol: ProtocolOption
     import numpy as np
 
     from bench.plugins.declare import Missing
+    from bench.scoring.doubts import doubts
 
     for dataset, source in _sources(name, data_dir, protocol):
         if isinstance(source, Missing):
@@ -63,8 +64,19 @@ def inspect(name: Name, data_dir: DataDirOption = None, protocol: ProtocolOption
                 f"{np.median(residuals):.2f} degrees, {100 * np.mean(residuals > 30):.1f} % over 30"
             )
         typer.echo(f"  source {instance.source}, revision {instance.revision[:12]}")
-        for note in instance.notes:
+        for note in (*instance.notes, *doubts(instance)):
             typer.echo(f"  note: {note}")
+
+
+@app.command("formats")
+def formats() -> None:
+    """List the files that are read and written."""
+    from bench.formats import known_formats
+
+    for form in known_formats():
+        able = {"graph": form.graph, "rotations": form.rotations, "written": form.write}
+        can = ", ".join(what for what, how in able.items() if how)
+        typer.echo(f"{form.name:<16} {can:<26} {' '.join(form.hints):<28} {form.summary}")
 
 
 @app.command("fetch")
@@ -82,10 +94,15 @@ def fetch(
 @app.command("verify")
 def verify(name: Annotated[str, typer.Argument(metavar="DATASET")], data_dir: DataDirOption = None) -> None:
     """Read every instance on disk and say what is wrong; exit code 1 where something is."""
+    from bench.plugins.declare import Missing
+    from bench.scoring.doubts import doubts
+
     wrong = 0
+    here = {source.name: source for _, source in _sources(name, data_dir, None) if not isinstance(source, Missing)}
     for scene, state in _fetchable(name).verify(data_dir):
+        said = [state, *(doubts(here[scene].load()) if state == "ok" and scene in here else ())]
         wrong += state != "ok"
-        typer.echo(f"{scene:<24} {state}")
+        typer.echo(f"{scene:<24} {'; '.join(said)}")
     raise typer.Exit(1 if wrong else 0)
 
 
@@ -94,7 +111,8 @@ def _sources(name: str | None, data_dir: Path | None, protocol: str | None) -> "
     from bench.plugins.catalog import catalog
 
     known = catalog("dataset")
-    for info, parameters in known.select([name] if name else known.entries):
+    every = (info.name for info in known if not info.facts["takes_paths"])
+    for info, parameters in known.select([known.with_paths(name)] if name else every):
         if protocol is not None and "protocol" in info.defaults():
             parameters |= {"protocol": protocol}
         for source in info.configure(parameters).sources(data_dir, 0):

@@ -56,6 +56,10 @@ def run(
     ] = None,
     timeout: Annotated[float | None, typer.Option(metavar="S", help="Wall clock seconds of one job.")] = None,
     memory: Annotated[float | None, typer.Option(metavar="GIB", help="Resident memory of one job.")] = None,
+    truth: Annotated[
+        str | None,
+        typer.Option(metavar="PATH", help="Absolute rotations, where -d names a path of your own."),
+    ] = None,
     use: UseOption = None,
     protocol: ProtocolOption = None,
     align: AlignOption = Align.L1,
@@ -96,6 +100,7 @@ def run(
         threads=threads,
         timeout_s=timeout,
         memory_gib=memory,
+        truth=truth or "",
         use=used(use),
         protocol=protocol,
         rerun=rerun.value,

@@ -1,17 +1,25 @@
 """``bench solve``: the user's own graph."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bench.cli.options import PluginOption, UseOption, used
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from bench.core.problem import Estimate, Problem
+    from bench.formats import GraphFile
+
 
 def solve(
-    graph: Annotated[Path, typer.Argument(help="1DSfM folder, EGs.txt, .g2o or .npz.")],
-    method: Annotated[str, typer.Option("--method", "-m", help="A selection, such as 'name[parameter=3]'.")],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help=".npz or .txt for the absolute rotations.")],
+    graph: Annotated[Path, typer.Argument(help="A file or folder; what is read is listed by `data formats`.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="For the absolute rotations; see there.")],
+    method: Annotated[
+        str | None, typer.Option("--method", "-m", help="A selection, such as 'name[parameter=3]'.  [default: robust]")
+    ] = None,
     seed: Annotated[int, typer.Option()] = 0,
     timeout: Annotated[float, typer.Option(metavar="SECONDS")] = 3600,
     memory: Annotated[float, typer.Option(metavar="GIB")] = 16,
@@ -23,35 +31,52 @@ def solve(
     from bench.core.limits import Limits
     from bench.execution.single import SingleSolver
     from bench.formats import read_graph, rotations_writer
-    from bench.plugins.catalog import catalog
+    from bench.plugins.catalog import catalog, default_method
 
-    chosen = catalog("method", plugin or []).one(method)
+    chosen = method or default_method()
+    info, parameters = catalog("method", plugin or []).one(chosen)
     loaded = read_graph(graph)
     write = rotations_writer(out, loaded)
     problem = loaded.problem
     typer.echo(f"{graph}: {problem.n} cameras, {problem.m} edges")
-    with SingleSolver(*chosen, Limits(timeout, memory, threads), used(use)) as solver:
+    with SingleSolver(info, parameters, Limits(timeout, memory, threads), used(use)) as solver:
         ended, report, estimate, _ = solver.solve(problem, seed)
-    for note in (*loaded.notes, *report.notes):
+    for note in (*loaded.notes, *report.notes, *_doubts(loaded)):
         typer.echo(f"note: {note}")
     if estimate is None:
-        typer.echo(f"{method}: {ended.text}", err=True)
+        typer.echo(f"{chosen}: {ended.text}", err=True)
         raise typer.Exit(1)
+    for name in sorted(problem.carries):
+        typer.echo(f"{name}: {'used' if name in report.used else f'not used by {chosen}'}")
     residuals = problem.residuals(estimate.rotations)
     said = {"edges": loaded.cameras[problem.edges], "residuals": residuals, "stop_reason": estimate.stop_reason}
     if estimate.edge_weights is not None:
         said["edge_weights"] = estimate.edge_weights
     write(loaded.cameras, estimate.rotations, said)
-    typer.echo(_summary(method, report.solve_s or 0.0, residuals))
+    typer.echo(f"{chosen}: {report.solve_s or 0.0:.2f} s{_fit(problem, estimate)}")
     typer.echo(f"wrote {out}")
 
 
-def _summary(method: str, seconds: float, residuals: "object") -> str:
+def _doubts(loaded: "GraphFile") -> "Iterator[str]":
+    from bench.core.redundancy import loops_told
+    from bench.scoring.conventions import diagnose
+
+    if unchecked := loops_told(loaded.problem):
+        yield unchecked
+    if diagnosis := diagnose(loaded.problem, ids=loaded.cameras):
+        yield diagnosis.sentence
+
+
+def _fit(problem: "Problem", estimate: "Estimate") -> str:
+    """How well the measurements fit that lie in loops; nothing of a tree, which always fits."""
     import numpy as np
 
-    degrees = np.degrees(np.asarray(residuals, dtype=float))
-    share = np.mean(degrees[np.isfinite(degrees)] < 5)
+    from bench.core.redundancy import in_no_loop
+
+    degrees = np.degrees(problem.residuals(estimate.rotations)[~in_no_loop(problem)])
+    degrees = degrees[np.isfinite(degrees)]
+    if not len(degrees):
+        return ""
     return (
-        f"{method}: {seconds:.2f} s, median edge residual {np.nanmedian(degrees):.3f} degrees, "
-        f"{100 * share:.0f} % of edges below 5"
+        f", median edge residual {np.median(degrees):.3f} degrees, {100 * np.mean(degrees < 5):.0f} % of edges below 5"
     )

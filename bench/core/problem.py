@@ -225,6 +225,8 @@ class Instance:
         Hash of the files or of the generator it was made from.
     notes
         What a reader of a table must know of it.
+    ids
+        (n,) what the files call the cameras; None where they are numbered.
     statistics
         What the paper's Table I prints of the scene, such as ``edges_percent`` and ``hardness``.
     """
@@ -238,6 +240,7 @@ class Instance:
     revision: str = ""
     notes: tuple[str, ...] = ()
     statistics: Mapping[str, float] = field(default_factory=dict)
+    ids: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,6 +32,7 @@ __all__ = [
     "Format",
     "GraphFile",
     "RotationsFile",
+    "holds",
     "known_formats",
     "read_graph",
     "read_rotations",
@@ -135,6 +136,17 @@ def rotations_writer(path: str | Path, source: GraphFile | None = None) -> Write
                 part.unlink(missing_ok=True)
 
     return replaced
+
+
+def holds(path: str | Path) -> frozenset[str]:
+    """Which of "graph" and "rotations" can be read from a file or folder; neither where it is of no known format."""
+    path = Path(path)
+    try:
+        beginning = Beginning.of(path)
+    except (OSError, InputError):
+        return frozenset()
+    kinds = [form.holds(path) for form in _FORMATS if form.recognises(beginning)]
+    return frozenset().union(*kinds)
 
 
 def _format_of(path: Path, holds: str) -> Format:

@@ -56,6 +56,15 @@ def load(path: Path, wanted: Collection[str], texts: Collection[str] = ()) -> di
         ) from error
 
 
+def names(path: Path) -> frozenset[str]:
+    """Names of the arrays in a ``.npz``; none where it cannot be read."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return frozenset(info.filename.removesuffix(".npy") for info in archive.infolist())
+    except (OSError, zipfile.BadZipFile):
+        return frozenset()
+
+
 def _arrays(
     archive: zipfile.ZipFile, wanted: Collection[str], texts: Collection[str], most: int
 ) -> dict[str, NDArray[Any]]:

@@ -42,8 +42,8 @@ class RotationsFile:
     names: tuple[str, ...] | None = None
     notes: tuple[str, ...] = ()
 
-    def of(self, graph: GraphFile) -> Floats:
-        """Rotations (n, 3, 3) of the cameras of a graph, by name where both files have names, by id otherwise.
+    def of(self, graph: "GraphFile | RotationsFile") -> Floats:
+        """Rotations (n, 3, 3) of the cameras of another file, by name where both files have names, by id otherwise.
 
         NaN where this file does not have a camera.
         """
@@ -151,6 +151,8 @@ class Format:
         Writes a solution to a path; the graph that was solved, if it came from a file, says more of its cameras.
     writable
         Raises `InputError` where a solution of that graph cannot be written; called before there is one.
+    contents
+        What a file holds, where not every file of this format holds all that can be read from it.
     """
 
     name: str
@@ -161,6 +163,12 @@ class Format:
     rotations: Callable[[Path], RotationsFile] | None = None
     write: Callable[[Path, Solution, GraphFile | None], None] | None = None
     writable: Callable[[Path, GraphFile | None], None] = lambda path, graph: None
+    contents: Callable[[Path], frozenset[str]] | None = None
+
+    def holds(self, path: Path) -> frozenset[str]:
+        """Which of "graph" and "rotations" a file of this format holds."""
+        able = frozenset(name for name in ("graph", "rotations") if getattr(self, name))
+        return able if self.contents is None else able & self.contents(path)
 
     def hint(self, path: Path) -> str:
         """The longest hint that fits a path; empty where none does."""

@@ -202,6 +202,12 @@ def _write(path: Path, solution: Solution, graph: GraphFile | None) -> None:
         np.savez(file, **arrays)
 
 
+def _contents(path: Path) -> frozenset[str]:
+    named = archive.names(path)
+    has = {"graph": {"edges", "rotations"} <= named, "rotations": "truth" in named or "edges" not in named}
+    return frozenset(name for name, held in has.items() if held)
+
+
 FORMATS = (
     Format(
         "npz",
@@ -211,5 +217,6 @@ FORMATS = (
         graph=read_npz,
         rotations=read_npz_rotations,
         write=_write,
+        contents=_contents,
     ),
 )

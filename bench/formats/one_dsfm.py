@@ -165,6 +165,11 @@ def _is_folder(beginning: Beginning) -> bool:
     return any((beginning.path / name).is_file() for name in (EDGES, BUNDLE)) and not beginning.data
 
 
+def _contents(folder: Path) -> frozenset[str]:
+    has = {"graph": folder / EDGES, "rotations": folder / BUNDLE}
+    return frozenset(name for name, path in has.items() if path.is_file())
+
+
 FORMATS = (
     Format(
         "1dsfm",
@@ -173,6 +178,7 @@ FORMATS = (
         _is_folder,
         graph=read_folder,
         rotations=read_bundle_rotations,
+        contents=_contents,
     ),
     Format(
         "egs",

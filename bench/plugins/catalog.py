@@ -7,6 +7,7 @@ import dataclasses
 import hashlib
 import importlib
 import importlib.util
+import os
 import pkgutil
 import sys
 import types
@@ -58,6 +59,16 @@ class Catalog(Generic[Declared]):
                 given = {key: getattr(configured, key) for key in combination}
                 chosen.setdefault(selection.format_selection(info.name, parameters_of(configured)), (info, given))
         return list(chosen.values())
+
+    def with_paths(self, text: str, truth: str = "") -> str:
+        """The selection that is meant: of the dataset that takes paths, where the text is the path of something."""
+        if text in self.entries or not os.path.exists(text):
+            return text
+        taker = next((info.name for info in self if info.facts.get("takes_paths")), None)
+        if taker is None:
+            return text
+        given = {"path": os.path.abspath(text)} | ({"truth": os.path.abspath(truth)} if truth else {})
+        return selection.format_selection(taker, given)
 
     def one(self, text: str) -> tuple[Declared, dict[str, Any]]:
         """Resolve a selection that stands for one configuration; `InputError` where it stands for several."""

@@ -223,13 +223,22 @@ def method(
 
 
 def dataset(
-    name: str, *, title: str, cite: str = "", requires: tuple[str, ...] = (), fetchable: bool = False
+    name: str,
+    *,
+    title: str,
+    cite: str = "",
+    requires: tuple[str, ...] = (),
+    fetchable: bool = False,
+    takes_paths: bool = False,
 ) -> Callable[[T], T]:
     """Declare a frozen dataclass with a `sources` method as a dataset.
 
-    A `fetchable` dataset has ``fetch(folder)`` and ``verify(data_dir)`` as well.
+    A `fetchable` dataset has ``fetch(folder)`` and ``verify(data_dir)`` as well. One that `takes_paths` has the
+    parameters ``path`` and ``truth``; where a selection is the path of a file or folder, it is meant.
     """
-    return _declare("dataset", name, title, cite, requires, {"fetchable": fetchable}, "sources")
+    return _declare(
+        "dataset", name, title, cite, requires, {"fetchable": fetchable, "takes_paths": takes_paths}, "sources"
+    )
 
 
 def _declare(

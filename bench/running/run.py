@@ -45,6 +45,8 @@ class Options:
         Override the suite's.
     jobs, threads
         How many jobs at a time, and how many threads the numerical libraries of each may use (by default one).
+    truth
+        A file or folder with absolute rotations, where a dataset is named by the path of a graph.
     use
         What methods may use of what comes with the measurements; None for all that they can.
     protocol
@@ -73,6 +75,7 @@ class Options:
     threads: int | None = None
     timeout_s: float | None = None
     memory_gib: float | None = None
+    truth: str = ""
     use: tuple[Information, ...] | None = None
     protocol: str | None = None
     rerun: Rerun = "never"
@@ -217,7 +220,10 @@ def _resolved(
         "memory_gib": options.memory_gib,
     }
     if datasets:
-        changes["datasets"] = experiment.narrowed(suite.datasets, datasets)
+        meant = [known_datasets.with_paths(text, options.truth) for text in datasets]
+        changes["datasets"] = experiment.narrowed(suite.datasets, meant)
+    elif options.truth:
+        raise InputError("--truth is that of a file or folder named with --dataset; name one")
     if methods and datasets and named is None:
         changes["name"] = "custom"
     suite = replace(suite, **{key: value for key, value in changes.items() if value is not None})

@@ -11,8 +11,8 @@ import hashlib
 import os
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, lru_cache
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ import pyarrow.parquet as pq
 import bench
 from bench.core.errors import InputError
 from bench.core.problem import Estimate, Floats, Instance
+from bench.scoring.doubts import doubts
 from bench.scoring.metrics.errors import all_camera_errors
 from bench.scoring.row import scored
 from bench.storage.record import Record
@@ -141,7 +142,7 @@ class _Scorer:
     def __init__(self, store: Store, rule: str) -> None:
         self.store = store
         self.rule = rule
-        self.instance = lru_cache(INSTANCES)(store.instance)
+        self.instance = lru_cache(INSTANCES)(partial(_noted, store))
         self.unreadable: dict[str, str] = {}
 
     def rows(self, jobs: Sequence[tuple[Job, int]]) -> list[dict[str, Any]]:
@@ -177,6 +178,18 @@ class _Scorer:
 
     def _tell(self, job: Job, sentence: str) -> None:
         self.unreadable[job.id] = sentence
+
+
+def _noted(store: Store, key: str) -> Instance:
+    """An instance, with what its conventions leave to doubt among its notes."""
+    instance = store.instance(key)
+    return replace(instance, notes=(*instance.notes, *_doubts(store, key)))
+
+
+@lru_cache(maxsize=1000)
+def _doubts(store: Store, key: str) -> tuple[str, ...]:
+    """Found once for all alignments."""
+    return tuple(doubts(store.instance(key)))
 
 
 @cache

@@ -118,7 +118,7 @@ class Store:
             return
         with self.work_folder() as work, _writing(final):
             save_problem(work / "problem.npz", instance.problem)
-            hidden: dict[str, Any] = {"truth": instance.truth, "outliers": instance.outliers}
+            hidden: dict[str, Any] = {"truth": instance.truth, "outliers": instance.outliers, "ids": instance.ids}
             with (work / "truth.npz").open("wb") as file:
                 np.savez(file, **{name: value for name, value in hidden.items() if value is not None})
             facts = {f.name: getattr(instance, f.name) for f in fields(_Facts)}
@@ -153,12 +153,13 @@ class Store:
         folder = self.folder / "instances" / key
         with _reading(folder, f"run the same command again, or see: {program()} doctor {self.folder} --repair"):
             problem = load_problem(folder / "problem.npz")
-            hidden = archive.load(folder / "truth.npz", ("truth", "outliers"))
-            shapes = {"truth": (problem.n, 3, 3), "outliers": (problem.m,)}
+            hidden = archive.load(folder / "truth.npz", ("truth", "outliers", "ids"))
+            shapes = {"truth": (problem.n, 3, 3), "outliers": (problem.m,), "ids": (problem.n,)}
             if any(values.shape != shapes[name] for name, values in hidden.items()):
                 raise ValueError("truth.npz does not fit problem.npz")
             facts = typed.read(_Facts, read_json(folder / "instance.json"), "instance.json")
-            return Instance(problem, hidden.get("truth"), outliers=hidden.get("outliers"), **vars(facts))
+            truth, outliers, ids = (hidden.get(name) for name in ("truth", "outliers", "ids"))
+            return Instance(problem, truth, outliers=outliers, ids=ids, **vars(facts))
 
     def record(self, job_id: str) -> Record | None:
         """Record of a job, or None where there is none.
