@@ -136,8 +136,8 @@ def _scenes(data_dir: Path | None) -> dict[str, Path]:
     """Folder of each scene on disk; of two of one name, the one that is found first."""
     found: dict[str, Path] = {}
     for root in roots(data_dir):
-        for edges in (*root.glob(f"*/{EDGES}"), *root.glob(f"{FOLDER}/*/{EDGES}")):
-            found.setdefault(edges.parent.name, edges.parent)
+        for edges in (*root.glob(EDGES), *root.glob(f"*/{EDGES}"), *root.glob(f"{FOLDER}/*/{EDGES}")):
+            found.setdefault(edges.resolve().parent.name, edges.parent)
     return found
 
 

@@ -49,6 +49,14 @@ def test_the_main_command_runs_every_method_of_the_card(workplace: Path) -> None
     assert set(table["method"]) == card
 
 
+def test_the_lines_of_python_run_as_written(workplace: Path) -> None:
+    blocks = [b for b in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "bench.solve" in b]
+    (block,) = blocks
+    done = subprocess.run([sys.executable, "-c", block], cwd=workplace, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 1e-6
+
+
 SHOWN = [c for c in COMMANDS if c.startswith("python -m bench") and "--suite 1dsfm" not in c and "fetch" not in c]
 
 
