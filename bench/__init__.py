@@ -1,8 +1,8 @@
 """The reference benchmark of rotation synchronization (multiple rotation averaging).
 
 What there is for users: `run`, `solve`, `score`, `report`, `catalog`, `Problem`, `Estimate`, `Instance`. What a plug-in
-needs besides: `method`, `dataset`, `parameter`, `Checkpoint`, `Skipped`, `Source`, `Missing`, `InputError`, `so3`,
-`stream`, and the array types `Floats` and `Ints`. Each is imported when it is first used.
+needs besides: `method`, `dataset`, `parameter`, `Checkpoint`, `Skipped`, `Source`, `Missing`, `InputError`,
+`suggestion`, `so3`, `stream`, and the array types `Floats` and `Ints`. Each is imported when it is first used.
 """
 
 from importlib import import_module
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from bench.api import solve as solve
     from bench.core import so3 as so3
     from bench.core.errors import InputError as InputError
+    from bench.core.errors import suggestion as suggestion
     from bench.core.problem import Checkpoint as Checkpoint
     from bench.core.problem import Estimate as Estimate
     from bench.core.problem import Floats as Floats
@@ -42,7 +43,7 @@ HOMES = {
     **dict.fromkeys(("method", "dataset", "Source", "Missing"), "bench.plugins.declare"),
     "catalog": "bench.plugins.catalog",
     "parameter": "bench.plugins.configure",
-    "InputError": "bench.core.errors",
+    **dict.fromkeys(("InputError", "suggestion"), "bench.core.errors"),
     "stream": "bench.core.seeds",
     "so3": "bench.core.so3",
 }

@@ -7,8 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from bench import Floats, InputError, Instance, Missing, Source, dataset
-from bench.core.errors import suggestion
+from bench import Floats, InputError, Instance, Missing, Source, dataset, suggestion
 from bench.formats.graph import GraphFile
 from bench.formats.one_dsfm import BUNDLE, COMPONENT, EDGES, IMAGES, read_bundle, read_folder
 

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench import Instance, Missing, Source, dataset
-from bench.core.errors import suggestion
+from bench import Instance, Missing, Source, dataset, suggestion
 from bench.formats.chain import propagated
 from bench.formats.pose_graph import read_pose_graph
 

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench import Instance, Missing, Problem, Source, dataset, parameter, so3, stream
-from bench.core.errors import suggestion
+from bench import Instance, Missing, Problem, Source, dataset, parameter, so3, stream, suggestion
 from bench.formats.npz import read_topology
 
 from ._files.folders import revision, roots

@@ -1,5 +1,6 @@
 """The wheel and the sdist: built, installed into an empty environment, and used outside and inside a checkout."""
 
+import os
 import subprocess
 import sys
 import sysconfig
@@ -16,7 +17,8 @@ SMALL = ("run", "-m", "spectral", "-d", "erdos-renyi[n=8,missing=0.2]")
 
 
 def run(*command: object, cwd: Path) -> str:
-    done = subprocess.run([*map(str, command)], cwd=cwd, capture_output=True, text=True, timeout=300)
+    own = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run([*map(str, command)], cwd=cwd, env=own, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
     return done.stdout
 

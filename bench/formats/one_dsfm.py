@@ -172,7 +172,7 @@ def _contents(folder: Path) -> frozenset[str]:
 
 FORMATS = (
     Format(
-        "1dsfm",
+        "1dsfm-folder",
         "scene of 1DSfM: a folder with EGs.txt and cc.txt, truth in gt_bundle.out",
         ("/",),
         _is_folder,

@@ -223,13 +223,13 @@ def _write(path: Path, solution: Solution, graph: GraphFile | None) -> None:
 
 
 def _writable(path: Path, graph: GraphFile | None) -> None:
-    if graph is None or graph.format != "pose-graph":
+    if graph is None or graph.format != "g2o":
         raise InputError(f"{path}: a pose graph is written from a pose graph; choose .txt, .npz or .csv")
 
 
 FORMATS = (
     Format(
-        "pose-graph",
+        "g2o",
         "g2o (also of vertigo, RTAB-Map, hdl_graph_slam) and TORO, in space and in the plane",
         (".g2o", ".graph"),
         _recognises,
