@@ -90,7 +90,7 @@ def test_a_pair_may_be_measured_again_from_either_end(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["graph.txt", "graph", "graph.docx"])
 def test_the_name_does_not_matter(tmp_path: Path, name: str) -> None:
     path = written(tmp_path, *(edge(i, j) for i, j in PAIRS), name=name)
-    assert read_graph(path).format == "pose-graph"
+    assert read_graph(path).format == "g2o"
     assert worst(path) < 1e-12
 
 

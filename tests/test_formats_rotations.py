@@ -131,7 +131,7 @@ def test_content_decides_whatever_the_name(tmp_path: Path) -> None:
     identity = " ".join(map(str, np.eye(3).ravel().astype(int)))
     contents = {
         "egs": f"0 1 {identity} 0 0 0\n",
-        "pose-graph": "EDGE_SE2 0 1 1 2 0.5\n",
+        "g2o": "EDGE_SE2 0 1 1 2 0.5\n",
         "relative-poses": "a.jpg b.jpg 1 0 0 0 1 2 3\n",
         "log": "0 1 2\n1 0 0 4\n0 1 0 5\n0 0 1 6\n0 0 0 1\n",
         "open3d": '{"class_name": "PoseGraph", "nodes": [{}, {}], "edges": [{"source_node_id": 0, "target_node_id": 1, '
