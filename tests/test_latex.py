@@ -12,7 +12,7 @@ import pytest
 from appearances import using
 
 from bench.papers.computed import Computed, Score
-from bench.papers.kinds.claims.statements import Claims, Verdict, Verdicts
+from bench.papers.kinds.claims import Claims, Verdict, Verdicts
 from bench.papers.kinds.curves.plot import CurvePlot, Curves, Point
 from bench.papers.kinds.properties import PropertyTable
 from bench.papers.kinds.scenes.table import SceneTable

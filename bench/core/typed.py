@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar
 
-from bench.core.errors import InputError, shown, suggestion
+from bench.core.errors import InputError, brief, shown, suggestion
 
 T = TypeVar("T")
 
@@ -89,7 +89,7 @@ def fitted(hint: Any, value: Any, at: str) -> Any:
         return tuple(fitted(arguments[0], entry, f"{at}[{k}]") for k, entry in enumerate(value))
     if origin is Mapping and isinstance(value, Mapping):
         return {
-            _plain(str, key, at): fitted(arguments[1], entry, f"{at}.{_brief(key)}") for key, entry in value.items()
+            _plain(str, key, at): fitted(arguments[1], entry, f"{at}.{brief(str(key))}") for key, entry in value.items()
         }
     if origin is typing.Literal and any(value == allowed and type(value) is type(allowed) for allowed in arguments):
         return value
@@ -140,8 +140,3 @@ def _spelled(hint: Any) -> str:
     if origin is tuple:
         return f"a list of {_SEVERAL.get(arguments[0], 'tables')}"
     return _PLAIN.get(hint, "a table")
-
-
-def _brief(key: Any) -> str:
-    text = str(key)
-    return text if text.isprintable() and len(text) <= 80 else shown(text)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from bench.core import outcome
 from bench.core.errors import InputError, suggestion
-from bench.papers.computed import extended, label, spelled
+from bench.papers.computed import extended, label
 from bench.papers.explain.measure import Answer, Measure
 from bench.papers.explain.switches import Explained, Setting, explain, switches
 from bench.papers.item import Item
@@ -110,10 +110,9 @@ def suites_of(table: SceneTable, scene: str, column: str, name: str) -> tuple[Su
         Of the suites.
     """
     data = extended(table.dataset, {table.scene_parameter: table.scenes[scene]})
-    limits = table.seeds, table.timeout_s, table.memory_gib
     wanted = [(data, candidates(table, column))]
     wanted += [(extended(data, {PROTOCOL: other}), candidates(table, column)[:1]) for other in _other(table)]
-    return tuple(Suite(name, table.title, (dataset,), methods, *limits) for dataset, methods in wanted)
+    return tuple(table.suite(name, [dataset], methods) for dataset, methods in wanted)
 
 
 def explain_cell(
@@ -134,7 +133,7 @@ def explain_cell(
     def answers(method: str, protocol: str) -> tuple[Sequence[Answer], str]:
         found, status = [], []
         for job in jobs:
-            if spelled(job) == method and _protocol(job.dataset) == protocol:
+            if job.label == method and _protocol(job.dataset) == protocol:
                 record = store.record(job.id)
                 status.append(record.outcome.text if record else outcome.NOT_RUN)
                 if record and record.outcome.ok:
