@@ -15,11 +15,11 @@ from bench.reporting.figures.errors import Run
 from bench.reporting.figures.looks import looks_by_selection
 from bench.reporting.html import overview, reversals, words
 from bench.reporting.html.embed import compact
-from bench.reporting.html.failures import Failure, failures, notes
+from bench.reporting.html.failures import failures, notes
 from bench.reporting.html.leaderboard import leaderboard
-from bench.reporting.html.origin import Facts, origin
+from bench.reporting.html.origin import origin
 from bench.reporting.html.scene import sections as forensics
-from bench.reporting.html.section import Section, Table, Value, anchor
+from bench.reporting.html.section import Section, Value, anchor
 from bench.reporting.tables.rows import Scene, is_timed
 from bench.reporting.tables.rows import scenes as scenes_of
 from bench.reporting.tables.standing import overall
@@ -150,20 +150,8 @@ def _unique(name: str, used: set[str]) -> str:
     return found
 
 
-def _html(
-    *,
-    title: str,
-    summary: Sequence[str],
-    flags: Sequence[tuple[bool, str]],
-    dependence: Table | None,
-    sections: Sequence[Section],
-    scenes: Sequence[ScenePage],
-    failures: Sequence[Failure],
-    notes: Sequence[tuple[str, str, str]],
-    footnotes: Sequence[str],
-    origin: Facts,
-    data: Mapping[str, Any],
-) -> str:
+def _html(data: Mapping[str, Any], **content: Any) -> str:
+    """The page of these data, with what its template says of the `content`."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from jinja2.utils import htmlsafe_json_dumps
     from markupsafe import Markup
@@ -179,16 +167,7 @@ def _html(
     scripts = [_asset("theme.js"), _plotly(), _asset("page.js")]
     embedded = {key: htmlsafe_json_dumps(value, dumps=_dumps) for key, value in data.items()}
     return environment.get_template("page.html").render(
-        title=title,
-        summary=summary,
-        flags=flags,
-        dependence=dependence,
-        sections=sections,
-        scenes=scenes,
-        failures=failures,
-        notes=notes,
-        footnotes=footnotes,
-        origin=origin,
+        **content,
         data=embedded,
         policy=_policy(scripts),
         style=Markup(_asset("style.css")),
