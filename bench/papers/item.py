@@ -41,8 +41,8 @@ class Comparison(ABC):
         return None
 
     def text(self, style: str, *, width: int = 100, terminal: bool = False) -> tuple[str, tuple[str, ...]]:
-        """The table in a format, and the notes that are not in it; see `bench.reporting.tables.text.text_of`."""
-        from bench.reporting.tables.text import text_of
+        """The table in a format, and the notes that are not in it; see `bench.reporting.tables.render.text_of`."""
+        from bench.reporting.tables.render import text_of
 
         grid = self.printed() if style == "latex" else self.grid()
         return text_of(grid, self.frame(), style, width=width, terminal=terminal)

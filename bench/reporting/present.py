@@ -22,7 +22,7 @@ def render_table(
     """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render.render`."""
     frame = appearance.current().ordered(results.frame)
     if style == "csv":
-        frame = with_intervals(frame, results.errors)
+        frame = with_intervals(frame, results.job_errors)
     return render.render(frame, results.ties, results.footnotes, style, width=width, terminal=terminal)
 
 

@@ -245,16 +245,10 @@ def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
     """The row of an estimate's best checkpoint; what only its end has is left out."""
     pick = along.oracle
     count = len(along.iterations)
-    absent = dict.fromkeys(
-        (
-            *("peak_mib", "cost", "certificate", "roc_auc", "min_s"),
-            *("speedup", "speedup_low", "speedup_high"),
-            *(k for k in row if k.startswith(("residual", "cost_"))),
-        )
-    )
+    absent = ("peak_mib", "cost", "certificate", "roc_auc", "min_s", "speedup", "residual")
     return {
         **row,
-        **{name: value for name, value in absent.items() if name in row},
+        **{name: None for name in row if name.startswith(absent)},
         **({"round_s": ()} if "round_s" in row else {}),
         **summary(along.errors[pick]),
         "params": ",".join(filter(None, [row["params"], ORACLE])),

@@ -19,12 +19,8 @@ NAMED = 4  # names in a list before "and 3 more"
 
 def summary(scenes: Sequence[Scene], standings: Sequence[Standing], timed: bool = False) -> list[str]:
     """What was compared, who is best, who is faster, and what failed, a sentence or two each."""
-    found = [what_was_compared(scenes)]
-    found += who_is_best(scenes, standings)
-    found += who_is_faster(scenes, standings, timed)
-    found.append(what_failed(scenes))
-    found += caveats(scenes)
-    return found
+    first = [what_was_compared(scenes), *who_is_best(scenes, standings), *who_is_faster(scenes, standings, timed)]
+    return [*first, what_failed(scenes), *caveats(scenes)]
 
 
 def what_was_compared(scenes: Sequence[Scene]) -> str:

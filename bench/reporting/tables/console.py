@@ -35,10 +35,14 @@ def render_console(
     frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str], *, width: int = 100, terminal: bool = False
 ) -> str:
     """Text of the table, with escape codes for bold where it is for a terminal."""
-    return _printed(console_blocks(frame, ties, footnotes, width=width), width, terminal)
+    timed = is_timed(frame)
+    blocks = [part for scene in scenes(frame, ties) for part in _block(scene, width, timed)]
+    legend = (Text(line, style="dim") for line in _legend(frame))
+    notes = [Text(), *(Text(f"- {note}") for note in footnotes)] if footnotes else []
+    return _printed(Group(*blocks, *legend, *notes), width, terminal)
 
 
-def render_grid(grid: Grid, footnotes: Sequence[str] = (), *, width: int = 100, terminal: bool = False) -> str:
+def render_grid(grid: Grid, *, width: int = 100, terminal: bool = False) -> str:
     """Text of a table of another shape; what is bold is marked with an asterisk too."""
     table = _empty_table()
     for name in grid.facts:
@@ -51,7 +55,7 @@ def render_grid(grid: Grid, footnotes: Sequence[str] = (), *, width: int = 100, 
         ends = k + 1 == len(grid.rows) or bool(grid.rows[k + 1][0][0])
         table.add_row(*map(Text, facts), *map(Text, shown), end_section=ends and not facts[0])
     notes = (Text(line, style="dim") for line in grid.notes)
-    return _printed(Group(Text(grid.caption, style="bold"), table, *notes, *_notes(footnotes)), width, terminal)
+    return _printed(Group(Text(grid.caption, style="bold"), table, *notes), width, terminal)
 
 
 def _printed(drawn: RenderableType, width: int, terminal: bool) -> str:
@@ -59,15 +63,6 @@ def _printed(drawn: RenderableType, width: int, terminal: bool) -> str:
     with console.capture() as capture:
         console.print(drawn)
     return "\n".join(line.rstrip() for line in capture.get().splitlines()) + "\n"
-
-
-def console_blocks(
-    frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str] = (), *, width: int = 100
-) -> RenderableType:
-    """The same as something rich can draw, for a live display."""
-    timed = is_timed(frame)
-    blocks = [part for scene in scenes(frame, ties) for part in _block(scene, width, timed)]
-    return Group(*blocks, *(Text(line, style="dim") for line in _legend(frame)), *_notes(footnotes))
 
 
 def _block(scene: Scene, width: int, timed: bool) -> Iterator[RenderableType]:
@@ -173,7 +168,3 @@ def _legend(frame: pd.DataFrame) -> list[str]:
     if "roc_auc" in frame and frame["roc_auc"].notna().any():
         lines.append(f"AUC: {ROC_LEGEND}")
     return lines
-
-
-def _notes(footnotes: Sequence[str]) -> list[RenderableType]:
-    return [Text(), *(Text(f"- {note}") for note in footnotes)] if footnotes else []
