@@ -20,8 +20,8 @@ from bench.papers.kinds.speedup import Ratio, Side, Speedup
 from bench.papers.layout import load_layout
 from bench.reporting.appearance import Appearance
 from bench.reporting.figures import style
-from bench.reporting.figures.captions import captions
 from bench.reporting.figures.paint_matplotlib import paint
+from bench.reporting.figures.style import captions
 from bench.reporting.present import drawings
 from bench.reporting.tables.grid import Grid, grids
 from bench.reporting.tables.latex import latex, latex_escape

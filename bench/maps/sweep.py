@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bench.core.errors import InputError
-from bench.core.problem import Floats, Instance
+from bench.core.problem import Floats
 from bench.maps.adaptive import Bools, Counts, Sample, Tally, every_sample, next_samples
 from bench.maps.axes import Axis
 from bench.maps.bounds import Drawn
@@ -110,6 +111,7 @@ class PhaseMap:
         title = f"{sweep.x.parameter} x {sweep.y.parameter}"
         suite = Suite("map", title, tuple(places), sweep.methods, sweep.seeds)
         self.run = Run(suite, options=replace(options, seeds=None))
+        self._instance = lru_cache(1)(self.run.store.instance)  # the methods of a batch come one after another on it
         self._cells = self._indexed(places)
         self.methods = tuple(dict.fromkeys(method for method, _ in self._cells))
         self.tallies = {method: Tally.empty(sweep.shape, sweep.seeds) for method in self.methods}
@@ -228,9 +230,3 @@ class PhaseMap:
             success = self.sweep.success.met(median, instance, self.parameters | self.sweep.varied(*sample[:2]))
             self._medians_deg.setdefault((method, *sample[:2]), []).append(median)
         self.tallies[method].add(sample, success)
-
-    def _instance(self, key: str) -> Instance:
-        """The last instance is kept: the methods of a batch come one after another on it."""
-        if getattr(self, "_last", ("", None))[0] != key:
-            self._last = key, self.run.store.instance(key)
-        return self._last[1]

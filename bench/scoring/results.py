@@ -14,6 +14,7 @@ from bench.plugins.selection import format_parameters, label, parse
 from bench.scoring.cache import Scores, scores_of
 from bench.scoring.inference.seed_ties import MANY_SEEDS, tied_by_seed
 from bench.scoring.inference.statistics import tied
+from bench.scoring.metrics.alignment import RULES
 from bench.scoring.metrics.errors import summary
 from bench.scoring.metrics.oracle import ORACLE, Curve, curve
 from bench.scoring.metrics.speedup import speedup
@@ -121,6 +122,14 @@ def score(
             frame = _with_oracle(frame, along)
     footnotes = [*_instance_notes(frame, scores.table), *scores.unreadable, *(plans[-1].missing if plans else ())]
     return Results(frame, errors, ties, tuple(footnotes), rule, curves, job_errors)
+
+
+def under_every_rule(store: Store, results: Results) -> dict[str, Results]:
+    """The same run by alignment rule, that of `results` first; nothing is run, and no curves are scored."""
+    shown = set(results.frame["job"])
+    jobs = [job for job in store.jobs() if job.id in shown]
+    others = [rule for rule in RULES if rule != results.alignment]
+    return {results.alignment: results} | {rule: score(store, rule, jobs=jobs) for rule in others}
 
 
 class _Read(Mapping[Key, Value]):

@@ -241,7 +241,7 @@ class Verdicts(Comparison):
     def grid(self) -> "Grid":
         """A row for each comparison: both sides and the verdict, under the honest rule and under the oracle."""
         from bench.reporting.tables.grid import ABSENT, Cell, Grid
-        from bench.reporting.tables.rows import degrees
+        from bench.reporting.tables.printed import degrees
 
         def cells(row: Verdict) -> Iterator[Cell]:
             for side in (row.left_deg, row.right_deg):

@@ -127,7 +127,7 @@ class Ratio(Comparison):
     def grid(self) -> "Grid":
         """A row for each of the two."""
         from bench.reporting.tables.grid import Cell, Grid
-        from bench.reporting.tables.rows import degrees
+        from bench.reporting.tables.printed import degrees
 
         def texts(row: Side) -> tuple[str, ...]:
             times = f"{row.iterations}", f"{1e3 * row.iteration_s:.2f}", f"{row.total_s:.3g}"

@@ -23,6 +23,7 @@ from bench.reporting.html.section import Section, Value, anchor
 from bench.reporting.tables.rows import Scene, is_timed
 from bench.reporting.tables.rows import scenes as scenes_of
 from bench.reporting.tables.standing import overall
+from bench.scoring.inference.dominance import clearly_better
 from bench.scoring.results import Results
 from bench.storage.store import Store
 
@@ -47,7 +48,7 @@ def write_report(store: Store, by_rule: Mapping[str, Results], path: Path) -> Pa
     store
         The run.
     by_rule
-        The run scored under one or more alignment rules, see `bench.reporting.html.realign`; the report is about
+        The run scored under one or more alignment rules, see `bench.scoring.results`; the report is about
         the first, the others are in the leaderboard and tell whether the choice matters.
     path
         The file, replaced where it exists.
@@ -91,7 +92,7 @@ def _flags(
 ) -> list[tuple[bool, str]]:
     """Sentence on each choice that was varied, and whether it matters."""
     found: list[tuple[bool, str]] = []
-    better = {rule: reversals.better_pairs(results) for rule, results in by_rule.items()}
+    better = {rule: {at: clearly_better(own) for at, own in r.errors.items()} for rule, r in by_rule.items()}
     if len(by_scene) > 1 and any(e.scored for s in scenes for e in s.entries):
         found += words.depends("alignment", by_scene, reversals.by_alignment(by_scene, better))
     protocols = list(dict.fromkeys(scene.protocol for scene in scenes))

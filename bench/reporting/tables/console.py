@@ -11,21 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from bench.reporting.tables.grid import Grid
-from bench.reporting.tables.rows import (
-    ROC_LEGEND,
-    TIE_LEGEND,
-    Entry,
-    Scene,
-    Ties,
-    area,
-    degrees,
-    exact_seconds,
-    is_timed,
-    scenes,
-    seconds,
-    speedup,
-    times_note,
-)
+from bench.reporting.tables.printed import area, degrees, exact_seconds, seconds, speedup
+from bench.reporting.tables.rows import ROC_LEGEND, TIE_LEGEND, Entry, Scene, Ties, is_timed, scenes, times_note
 
 NO_TRUTH = " · no ground truth: edge residuals, not errors"
 WIDE = 96  # columns from which the 90th percentile and the share under 5 degrees fit

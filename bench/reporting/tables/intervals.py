@@ -24,9 +24,9 @@ def with_intervals(frame: pd.DataFrame, job_errors: Mapping[str, Floats]) -> pd.
 
 
 def _ends(errors: Floats | None) -> dict[str, float]:
-    known = errors is not None and np.isfinite(errors).sum() >= MIN_CAMERAS
+    enough = errors if errors is not None and np.isfinite(errors).sum() >= MIN_CAMERAS else np.empty(0)
     found: dict[str, float] = {}
     for statistic in STATISTICS:
-        low, high = confidence_interval(errors, statistic) if known and errors is not None else (np.nan, np.nan)
+        low, high = confidence_interval(enough, statistic)
         found |= {f"{statistic}_low_deg": low, f"{statistic}_high_deg": high}
     return found

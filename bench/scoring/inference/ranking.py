@@ -36,7 +36,8 @@ def rank_probabilities(blocks: Blocks) -> Floats:
     from scipy.stats import rankdata
 
     rng = np.random.default_rng(0)
-    by_scene = _by_scene(blocks)
+    own, scene_of = ranks(blocks.values), np.asarray(blocks.scenes)
+    by_scene = [own[scene_of == scene] for scene in np.unique(scene_of)]
     count = len(blocks.methods)
     drawn = np.zeros((RESAMPLES, count))
     for total in drawn:
@@ -48,12 +49,6 @@ def rank_probabilities(blocks: Blocks) -> Floats:
     place = np.arange(1, count + 1)
     inside = (low <= place) & (place <= high)
     return np.asarray((inside / inside.sum(axis=2, keepdims=True)).mean(axis=0))
-
-
-def _by_scene(blocks: Blocks) -> list[Floats]:
-    """Ranks (problems, methods) of each scene."""
-    own, scene_of = ranks(blocks.values), np.asarray(blocks.scenes)
-    return [own[scene_of == scene] for scene in np.unique(scene_of)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,7 +162,7 @@ class Curves(Comparison):
     def grid(self) -> "Grid":
         """A row for each panel and place on the axis, a column for each curve."""
         from bench.reporting.tables.grid import Cell, Grid
-        from bench.reporting.tables.rows import degrees
+        from bench.reporting.tables.printed import degrees
 
         def text(point: Point) -> str:
             spread = f" ±{degrees(point.half_width_deg)}" if math.isfinite(point.half_width_deg) else ""
