@@ -201,8 +201,7 @@ def report(run: str | Path, align: str = "l1", out: str | Path | None = None) ->
     The file that was written.
     """
     from bench.reporting.html.page import FILE_NAME, write_report
-    from bench.reporting.html.realign import under_every_rule
-    from bench.scoring.results import score
+    from bench.scoring.results import score, under_every_rule
     from bench.storage.store import Store
 
     store = Store.open(Path(run))

@@ -66,7 +66,7 @@ class ErdosRenyi:
 
     def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source]:
         """One instance for each seed."""
-        identity = self._revision(seed)
+        identity = revision([Path(__file__), *CODE], repr(self), str(seed))
         yield Source(self._name(), identity, lambda: self._generate(seed, identity), seeded=True)
 
     def _generate(self, seed: int, identity: str) -> Instance:
@@ -92,7 +92,3 @@ class ErdosRenyi:
         """``n100-missing0.5``, then every other parameter that is not at its default."""
         parts = [f"n{self.n}", f"missing{self.missing}", *Measurements.of(self).label()]
         return "-".join([*parts, "clairvoyant"] if self.clairvoyant else parts)
-
-    def _revision(self, seed: int) -> str:
-        """Hash of the code that generates, the parameters and the seed."""
-        return revision([Path(__file__), *CODE], repr(self), str(seed))

@@ -51,7 +51,7 @@ class PoseGraph:
         if not (measured.is_file() and noise_free.is_file()):
             return Missing(SPHERE, "python -m pip install 'gtsam>=4.3'")
         identity = revision([measured, noise_free])
-        return Source(SPHERE, identity, lambda: _load_sphere(measured, noise_free, identity))
+        return Source(SPHERE, identity, lambda: _load(measured, identity, noise_free))
 
     def _file(self, data_dir: Path | None) -> Source | Missing:
         folders = [folder for root in roots(data_dir) for folder in (root, root / FOLDER)]
@@ -59,7 +59,7 @@ class PoseGraph:
         path = next((path for path in paths if path.is_file()), None)
         if path is not None:
             identity = revision([path])
-            return Source(self.graph, identity, lambda: _load_file(path, identity))
+            return Source(self.graph, identity, lambda: _load(path, identity))
         names = {SPHERE, *(other.stem for folder in folders for other in folder.glob("*.g2o"))}
         where = f"put {self.graph}.g2o in {folders[0]} or name its folder with --data-dir"
         return Missing(self.graph, f"{where}{suggestion(self.graph, names)}")
@@ -72,29 +72,16 @@ def _gtsam_data() -> Path:
     return Path(places[0]) / "Data" if places else Path("gtsam-is-not-installed")
 
 
-def _load_sphere(measured: Path, noise_free: Path, identity: str) -> Instance:
-    problem = read_pose_graph(measured).problem
-    return Instance(
-        problem,
-        propagated(read_pose_graph(noise_free).problem),
-        name=SPHERE,
-        source="GTSAM's Data folder: sphere2500.txt, truth from sphere2500_groundtruth.txt",
-        revision=identity,
-        statistics=statistics(problem),
-    )
-
-
-def _load_file(path: Path, identity: str) -> Instance:
+def _load(path: Path, identity: str, noise_free: Path | None = None) -> Instance:
+    """The graph of a file, with the truth that follows from the noise-free one beside it, where there is one."""
     graph = read_pose_graph(path)
+    unscored = "no ground truth (vertices are initial guesses): not scored, cost and time only"
     return Instance(
         graph.problem,
-        None,
+        propagated(read_pose_graph(noise_free).problem) if noise_free else None,
         name=path.stem,
-        source=path.name,
+        source=f"GTSAM's Data folder: {path.name}, truth from {noise_free.name}" if noise_free else path.name,
         revision=identity,
-        notes=(
-            *graph.notes,
-            "no ground truth (vertices are initial guesses): not scored, cost and time only",
-        ),
+        notes=() if noise_free else (*graph.notes, unscored),
         statistics=statistics(graph.problem),
     )

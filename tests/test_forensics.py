@@ -17,11 +17,10 @@ from bench.reporting.html import graph
 from bench.reporting.html.case import Case, Solved
 from bench.reporting.html.embed import compact
 from bench.reporting.html.page import render
-from bench.reporting.html.realign import under_every_rule
 from bench.reporting.html.scene import sections, sections_of
 from bench.reporting.html.section import Section
 from bench.running.run import Options, Run
-from bench.scoring.results import Results, score
+from bench.scoring.results import Results, score, under_every_rule
 from bench.storage.store import Store
 
 PLACE = ("toy", "P", "all")

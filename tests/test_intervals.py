@@ -18,11 +18,12 @@ RANKINGS = {"rank-probabilities", "critical-difference", "performance-profile-er
 
 
 def results(scenes: int, cameras: int = 40, methods: int = 3) -> Results:
-    rows, errors = [], {}
+    rows, errors, by_job = [], {}, {}
     for k in range(scenes):
         for m in range(methods):
             own = np.random.default_rng([k, m]).gamma(2, 1 + m, cameras)
             errors.setdefault(("d", f"s{k}", "all"), {})[f"m{m}", ""] = (own,)
+            by_job[f"{k}-{m}"] = own
             row = {"dataset": "d", "instance": f"s{k}", "instance_key": f"s{k}", "method": f"m{m}", "title": f"M{m}"}
             row |= {
                 "params": "",
@@ -32,10 +33,12 @@ def results(scenes: int, cameras: int = 40, methods: int = 3) -> Results:
                 "outcome": "ok",
                 "status": "ok",
                 "notes": "",
+                "stop_reason": "",
+                "job": f"{k}-{m}",
             }
             row |= {"solve_s": 1.0 + m, "peak_mib": 1.0, "n_cameras": cameras, "n_solved": cameras}
             rows.append(row | summary(own))
-    return Results(pd.DataFrame(rows), errors, {}, (), "l1", {})
+    return Results(pd.DataFrame(rows), errors, {}, (), "l1", {}, by_job)
 
 
 def test_the_long_table_has_the_interval_of_every_row() -> None:
@@ -57,9 +60,10 @@ def test_few_cameras_and_failures_have_none() -> None:
     assert few["median_low_deg"].isna().all()
     run = results(1)
     run.frame.loc[1, ["outcome", "status"]] = "timeout"
-    run.errors["d", "s0", "all"]["m1", ""] = (np.full(40, np.nan),)  # type: ignore[index]
+    run.job_errors["0-1"] = np.full(40, np.nan)  # type: ignore[index]
+    run.frame.loc[2, "stop_reason"] = "oracle"
     table = pd.read_csv(io.StringIO(render_table(run, "csv")[0]))
-    assert table["mean_high_deg"].isna().tolist() == [False, True, False]
+    assert table["mean_high_deg"].isna().tolist() == [False, True, True]
 
 
 def test_rankings_are_drawn_from_two_problems_on() -> None:

@@ -12,7 +12,7 @@ import pytest
 from appearances import using
 
 from bench.papers.computed import Computed, Score
-from bench.papers.kinds.claims.statements import Claims, Verdict, Verdicts
+from bench.papers.kinds.claims import Claims, Verdict, Verdicts
 from bench.papers.kinds.curves.plot import CurvePlot, Curves, Point
 from bench.papers.kinds.properties import PropertyTable
 from bench.papers.kinds.scenes.table import SceneTable
@@ -20,8 +20,8 @@ from bench.papers.kinds.speedup import Ratio, Side, Speedup
 from bench.papers.layout import load_layout
 from bench.reporting.appearance import Appearance
 from bench.reporting.figures import style
-from bench.reporting.figures.captions import captions
 from bench.reporting.figures.paint_matplotlib import paint
+from bench.reporting.figures.style import captions
 from bench.reporting.present import drawings
 from bench.reporting.tables.grid import Grid, grids
 from bench.reporting.tables.latex import latex, latex_escape

@@ -54,7 +54,7 @@ def test_what_is_not_a_number_is_out_of_range() -> None:
         ("method", "dmf-synch[init_scale=1]", "'init_scale' has no meaning for preset=thin"),
         ("method", "dmf-synch[preset=dense,init=random]", "'init' has no meaning for preset=dense"),
         ("method", "dmf-synch[preset=dense,loss=l1/2]", "not l1/2"),
-        ("method", "dmf-synch[loss=l3]", "takes l1 or l2 or l1/2 or none"),
+        ("method", "dmf-synch[loss=l3]", "must be 'l1' or 'l2' or 'l1/2' or none"),
         ("method", "crdmf[device=cpu]", "'device' has no meaning for preset=thin"),
         ("method", "crdmf[preset=paper,init=spectral]", "'init' has no meaning for preset=paper"),
         ("dataset", "view-graph[scene=../Wheel]", "without folders"),

@@ -32,10 +32,10 @@ def test_a_plugin_file_is_found_and_configured(tmp_path: Path) -> None:
     ("parameters", "sentence"),
     [
         ({"dept": 1}, "has no parameter 'dept'; did you mean 'depth'"),
-        ({"depth": 1.5}, "'depth' of method 'mine' takes int, not 1.5"),
-        ({"depth": True}, "takes int, not true"),
-        ({"loss": "l3"}, "takes l1 or l2, not l3"),
-        ({"width": "wide"}, "takes int or none, not wide"),
+        ({"depth": 1.5}, "'depth' of method 'mine' must be a whole number, not 1.5"),
+        ({"depth": True}, "must be a whole number, not True"),
+        ({"loss": "l3"}, "must be 'l1' or 'l2', not 'l3'"),
+        ({"width": "wide"}, "must be a whole number or none, not 'wide'"),
     ],
 )
 def test_bad_parameters_are_one_sentence(tmp_path: Path, parameters: dict[str, object], sentence: str) -> None:

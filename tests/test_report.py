@@ -10,11 +10,10 @@ from bench.reporting.html import reversals, words
 from bench.reporting.html.embed import compact
 from bench.reporting.html.leaderboard import ALL_SCENES, leaderboard
 from bench.reporting.html.page import render, write_report
-from bench.reporting.html.realign import under_every_rule
 from bench.reporting.html.section import anchor
 from bench.reporting.tables.rows import Entry, Failed, Scene, Value
 from bench.reporting.tables.standing import standings
-from bench.scoring.results import score
+from bench.scoring.results import score, under_every_rule
 from tests.commands import bench
 from tests.runs import Made, made_run
 

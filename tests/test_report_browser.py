@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from bench.reporting.html.page import write_report
-from bench.reporting.html.realign import under_every_rule
-from bench.scoring.results import score
+from bench.scoring.results import score, under_every_rule
 from tests.commands import bench
 from tests.runs import Made, made_run
 

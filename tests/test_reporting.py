@@ -4,7 +4,6 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from rich.console import Console
 
 from bench.core.errors import InputError
 from bench.reporting.figures import style
@@ -12,7 +11,6 @@ from bench.reporting.figures.looks import GREY, looks
 from bench.reporting.figures.paint_matplotlib import paint
 from bench.reporting.present import drawings
 from bench.reporting.tables import render as tables
-from bench.reporting.tables.console import console_blocks
 from bench.reporting.tables.latex import latex_escape
 from bench.scoring.metrics.errors import summary
 from bench.scoring.results import Results
@@ -146,11 +144,6 @@ class TestConsole:
     def test_times_are_labelled(self, run):
         assert "packed accuracy run" in render(run, "console")[0]
         assert "packed" not in tables.render(run[0].assign(timing=True), {}, ())[0]
-
-    def test_a_live_display_can_draw_it(self, run):
-        console = Console(file=io.StringIO(), width=90)
-        console.print(console_blocks(run[0], run[2]))
-        assert "Ellis_Island" in console.file.getvalue()
 
 
 class TestMarkdown:

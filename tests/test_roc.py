@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import trapezoid
 
 from bench.reporting.tables import render
-from bench.reporting.tables.rows import area
+from bench.reporting.tables.printed import area
 from bench.running.run import Options, Run
 from bench.scoring.metrics.roc import roc_auc, roc_curve
 from bench.scoring.results import Results, score

@@ -16,7 +16,7 @@ from bench.execution.child import Request
 from bench.execution.execute import Ended
 from bench.execution.output import ESTIMATE_FILE
 from bench.reporting.tables import render
-from bench.reporting.tables.rows import exact_seconds
+from bench.reporting.tables.printed import exact_seconds
 from bench.running.engines import timing
 from bench.running.run import Options, Run
 from bench.scoring.metrics.speedup import speedup

@@ -56,23 +56,13 @@ def bench(
     """Compare rotation synchronization (multiple rotation averaging) methods."""
 
 
-app.command("run")(run.run)
-app.command("rerun")(rerun.rerun)
-app.command("list")(list_.list_)
-app.command("table")(table.table)
-app.command("plot")(plot.plot)
-app.command("compare")(compare.compare)
-app.command("report")(report.report)
-app.command("paper")(paper.paper)
-app.command("merge")(merge.merge)
-app.command("doctor")(doctor.doctor)
-app.command("bibtex")(bibtex.bibtex)
-app.command("map")(map.map_)
+VERBS = (
+    *(run.run, rerun.rerun, list_.list_, table.table, plot.plot, compare.compare, report.report, paper.paper),
+    *(merge.merge, doctor.doctor, bibtex.bibtex, map.map_, solve.solve, score.score, new.new, check.check),
+)
+for verb in VERBS:
+    app.command(verb.__name__.rstrip("_"))(verb)
 app.add_typer(data.app, name="data")
-app.command("solve")(solve.solve)
-app.command("score")(score.score)
-app.command("new")(new.new)
-app.command("check")(check.check)
 
 
 def main() -> None:

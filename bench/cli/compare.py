@@ -28,7 +28,7 @@ def compare(
     """
     from bench.core.errors import InputError
     from bench.reporting.tables.compared import comparison_grid, comparison_table, verdict
-    from bench.reporting.tables.text import text_of
+    from bench.reporting.tables.render import text_of
     from bench.scoring.comparison import compare as compared
     from bench.scoring.results import score
     from bench.storage.store import Store

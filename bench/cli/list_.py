@@ -8,14 +8,7 @@ import typer
 
 from bench.cli.options import PluginOption
 
-
-class What(StrEnum):
-    """What can be listed."""
-
-    METHODS = "methods"
-    DATASETS = "datasets"
-    SUITES = "suites"
-    PAPERS = "papers"
+What = StrEnum("What", ["METHODS", "DATASETS", "SUITES", "PAPERS"])  # that can be listed
 
 
 def list_(what: Annotated[What, typer.Argument()], plugin: PluginOption = None) -> None:

@@ -11,14 +11,8 @@ import typer
 if TYPE_CHECKING:
     from bench.core.problem import Information
 
-
-class Align(StrEnum):
-    """Gauge alignment rules."""
-
-    L1 = "l1"
-    CHORDAL = "chordal"
-    KARCHER = "karcher"
-    ANCHORS = "anchors"
+Align = StrEnum("Align", ["L1", "CHORDAL", "KARCHER", "ANCHORS"])  # rules that remove the gauge
+Format = StrEnum("Format", ["CONSOLE", "MARKDOWN", "CSV", "LATEX"])  # how a table is written
 
 
 class Rerun(StrEnum):
@@ -34,15 +28,6 @@ class Engine(StrEnum):
 
     LOCAL = "local"
     DASK = "dask"
-
-
-class Format(StrEnum):
-    """How a table is written."""
-
-    CONSOLE = "console"
-    MARKDOWN = "markdown"
-    CSV = "csv"
-    LATEX = "latex"
 
 
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or its name under results/runs.")]

@@ -20,8 +20,7 @@ def report(
     leaderboard has all of them, and the report says whether the choice changes the ranking.
     """
     from bench.reporting.html.page import FILE_NAME, write_report
-    from bench.reporting.html.realign import under_every_rule
-    from bench.scoring.results import score
+    from bench.scoring.results import score, under_every_rule
     from bench.storage.store import Store
 
     folder = run_folder(run)

@@ -145,9 +145,8 @@ def _list_cells(planned: "Run") -> None:
 
 def _present(planned: "Run", align: Align) -> None:
     from bench.reporting.html.page import FILE_NAME, write_report
-    from bench.reporting.html.realign import under_every_rule
     from bench.reporting.present import render_table, write_plots, write_tables
-    from bench.scoring.results import score
+    from bench.scoring.results import score, under_every_rule
 
     wear()
     results = score(planned.store, align.value, planned.options.protocol, checkpoints=True)

@@ -18,6 +18,11 @@ def shown(value: object, most: int = 80) -> str:
     return text if len(text) <= most else f"{text[:most]}..."
 
 
+def brief(name: str) -> str:
+    """A name from outside as it is, where it can be read and is not long; else as `shown`."""
+    return name if name.isprintable() and len(name) <= 80 else shown(name)
+
+
 def described(error: BaseException, most: int = 300) -> str:
     """Type and message of an exception in one printable line; a plug-in's own may even fail to be written."""
     try:

@@ -122,9 +122,9 @@ def random_axes(rng: np.random.Generator, size: int) -> Array:
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
-def chordal_mean(r: Array, weights: Array | None = None) -> Array:
+def chordal_mean(r: Array) -> Array:
     """Rotation (3, 3) that minimises the sum of squared chordal distances to r (k, 3, 3)."""
-    return project(np.average(r, axis=0, weights=weights))
+    return project(r.mean(axis=0))
 
 
 def karcher_mean(r: Array) -> Array:

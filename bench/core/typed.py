@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar
 
-from bench.core.errors import InputError, shown, suggestion
+from bench.core.errors import InputError, brief, shown, suggestion
 
 T = TypeVar("T")
 
@@ -46,14 +46,14 @@ def read(cls: type[T], content: Mapping[str, Any], where: str) -> T:
 def _instance(cls: Any, content: Any, at: str) -> Any:
     if not isinstance(content, Mapping):
         raise _wrong("a table", content, at)
-    fields = _fields(cls)
+    fields = fields_of(cls)
     for key in content:
         if key not in fields:
             raise InputError(f"{at.removesuffix(':')}: unknown key {shown(key)}{suggestion(str(key), fields)}")
     values = {}
     for key, (hint, needed) in fields.items():
         if key in content:
-            values[key] = _value(hint, content[key], f"{at}{' ' if at.endswith(':') else '.'}{key}")
+            values[key] = fitted(hint, content[key], f"{at}{' ' if at.endswith(':') else '.'}{key}")
         elif needed:
             raise InputError(f"{at.removesuffix(':')}: key '{key}' is missing")
     try:
@@ -63,7 +63,7 @@ def _instance(cls: Any, content: Any, at: str) -> Any:
 
 
 @cache
-def _fields(cls: Any) -> Mapping[str, tuple[Any, bool]]:
+def fields_of(cls: Any) -> Mapping[str, tuple[Any, bool]]:
     """Of each field its annotation, and whether it has no default."""
     hints = typing.get_type_hints(cls)
     missing = dataclasses.MISSING
@@ -74,8 +74,8 @@ def _fields(cls: Any) -> Mapping[str, tuple[Any, bool]]:
     }
 
 
-def _value(hint: Any, value: Any, at: str) -> Any:
-    """`value` as what the annotation says."""
+def fitted(hint: Any, value: Any, at: str) -> Any:
+    """`value` as what the annotation says, see `read`; `at` is what has it, for messages."""
     if hint in _PLAIN:
         return _plain(hint, value, at)
     if hint is Any:
@@ -86,10 +86,10 @@ def _value(hint: Any, value: Any, at: str) -> Any:
     if origin is tuple and isinstance(value, list | tuple):
         if set(map(type, value)) <= {arguments[0]} & {str, float, int} and _fit(value):
             return tuple(value)  # a column may have a million entries
-        return tuple(_value(arguments[0], entry, f"{at}[{k}]") for k, entry in enumerate(value))
+        return tuple(fitted(arguments[0], entry, f"{at}[{k}]") for k, entry in enumerate(value))
     if origin is Mapping and isinstance(value, Mapping):
         return {
-            _plain(str, key, at): _value(arguments[1], entry, f"{at}.{_brief(key)}") for key, entry in value.items()
+            _plain(str, key, at): fitted(arguments[1], entry, f"{at}.{brief(str(key))}") for key, entry in value.items()
         }
     if origin is typing.Literal and any(value == allowed and type(value) is type(allowed) for allowed in arguments):
         return value
@@ -105,7 +105,7 @@ def _one_of(options: tuple[Any, ...], value: Any, at: str) -> Any:
     complaint = None
     for option in options:
         try:
-            return _value(option, value, at)
+            return fitted(option, value, at)
         except InputError as error:
             if not str(error).startswith(f"{at} must be"):
                 complaint = error
@@ -136,12 +136,7 @@ def _spelled(hint: Any) -> str:
     """What an annotation takes, in words."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is typing.Literal:
-        return " or ".join(map(repr, arguments))
+        return " or ".join("none" if value is None else repr(value) for value in arguments)
     if origin is tuple:
         return f"a list of {_SEVERAL.get(arguments[0], 'tables')}"
     return _PLAIN.get(hint, "a table")
-
-
-def _brief(key: Any) -> str:
-    text = str(key)
-    return text if text.isprintable() and len(text) <= 80 else shown(text)

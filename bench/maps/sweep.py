@@ -1,20 +1,20 @@
 """A phase map in the making: samples are ordinary jobs of an ordinary run, asked for round by round."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bench.core.errors import InputError
-from bench.core.problem import Floats, Instance
+from bench.core.problem import Floats
 from bench.maps.adaptive import Bools, Counts, Sample, Tally, every_sample, next_samples
 from bench.maps.axes import Axis
 from bench.maps.bounds import Drawn
 from bench.maps.criterion import Criterion, median_of_all
 from bench.plugins import selection
 from bench.plugins.catalog import catalog
-from bench.plugins.declare import Info
 from bench.running.run import Options, Run
 from bench.scoring.metrics.errors import camera_errors
 from bench.suite.experiment import Cell, Suite
@@ -55,15 +55,6 @@ class Sweep:
     def varied(self, x: int, y: int) -> dict[str, Any]:
         """The two parameters in a cell."""
         return {self.x.parameter: self.x.values[x], self.y.parameter: self.y.values[y]}
-
-
-@dataclass(frozen=True)
-class _Sampled:
-    """What one job has told."""
-
-    median_deg: float
-    success: bool
-    answered: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +104,18 @@ class PhaseMap:
             raise InputError(f"both axes are '{sweep.x.parameter}'; a map needs two parameters")
         self.parameters = {**self.dataset.defaults(), **given}
         sweep.success.check(self.parameters)
-        self.run = Run(_suite(sweep, self.dataset, given), options=replace(options, seeds=None))
-        self._cells = self._indexed(given)
+        places = {
+            selection.format_selection(self.dataset.name, given | sweep.varied(x, y)): (x, y)
+            for x, y in np.ndindex(*sweep.shape)
+        }
+        title = f"{sweep.x.parameter} x {sweep.y.parameter}"
+        suite = Suite("map", title, tuple(places), sweep.methods, sweep.seeds)
+        self.run = Run(suite, options=replace(options, seeds=None))
+        self._instance = lru_cache(1)(self.run.store.instance)  # the methods of a batch come one after another on it
+        self._cells = self._indexed(places)
         self.methods = tuple(dict.fromkeys(method for method, _ in self._cells))
         self.tallies = {method: Tally.empty(sweep.shape, sweep.seeds) for method in self.methods}
-        self._samples: dict[str, dict[tuple[int, int], list[_Sampled]]] = {method: {} for method in self.methods}
+        self._medians_deg: dict[tuple[str, int, int], list[float]] = {}  # by method and place, of what was answered
 
     @property
     def taken(self) -> int:
@@ -178,10 +176,9 @@ class PhaseMap:
 
     def _layers(self, method: str, tally: Tally) -> Layers:
         answered, medians_deg = np.zeros(self.sweep.shape, np.intp), np.full(self.sweep.shape, np.nan)
-        for place, told in self._samples[method].items():
-            medians = [sampled.median_deg for sampled in told if sampled.answered]
-            answered[place] = len(medians)
-            medians_deg[place] = np.mean(medians) if medians else np.nan
+        for (of, *place), medians in self._medians_deg.items():
+            if of == method:
+                answered[*place], medians_deg[*place] = len(medians), np.mean(medians)
         return Layers(tally.tried, tally.hits, tally.tried - answered, medians_deg, tally.expected())
 
     def frame(self) -> "pd.DataFrame":
@@ -205,20 +202,15 @@ class PhaseMap:
             sources = [self._cells[first, (x, y, seed)].source for seed in range(self.sweep.seeds)]
             yield (x, y), self.parameters | self.sweep.varied(x, y), (source.load() for source in sources)
 
-    def _indexed(self, given: dict[str, Any]) -> dict[tuple[str, Sample], Cell]:
-        """Every cell of the experiment by the method and the sample that it is."""
-        places = {
-            selection.format_selection(self.dataset.name, given | self.sweep.varied(x, y)): (x, y)
-            for x, y in np.ndindex(*self.sweep.shape)
-        }
+    def _indexed(self, places: Mapping[str, tuple[int, int]]) -> dict[tuple[str, Sample], Cell]:
+        """Every cell of the experiment by method and sample; `places` are those of the dataset's selections."""
         found = {}
         for cell in self.run.cells:
             job = cell.job
             if cell.method.not_installed(job.parameters):
                 hint = cell.method.install_hint(job.parameters)
                 raise InputError(f"method '{job.label}' is not installed: {hint}")
-            method = selection.format_selection(job.method, dict(job.parameters))
-            found[method, (*places[job.dataset], job.seed)] = cell
+            found[job.label, (*places[job.dataset], job.seed)] = cell
         methods = {method for method, _ in found}
         if len(found) != len(methods) * len(places) * self.sweep.seeds:
             raise InputError(f"dataset '{self.dataset.name}' is not drawn anew for every seed; a map needs one that is")
@@ -228,28 +220,13 @@ class PhaseMap:
         cell = self._cells[method, sample]
         store = self.run.store
         record = store.record(cell.job.id)
-        told = _Sampled(np.inf, False, False)
+        success = False
         if record is not None and record.outcome.ok:
             instance = self._instance(cell.job.instance_key)
             if instance.truth is None:
                 raise InputError(f"dataset '{self.dataset.name}' has no truth to tell success by")
             errors = camera_errors(store.estimate(cell.job.id).rotations, instance.truth, self.sweep.alignment)
             median = median_of_all(errors[np.isfinite(instance.truth).all(axis=(1, 2))])
-            met = self.sweep.success.met(median, instance, self.parameters | self.sweep.varied(*sample[:2]))
-            told = _Sampled(median, met, True)
-        self.tallies[method].add(sample, told.success)
-        self._samples[method].setdefault(sample[:2], []).append(told)
-
-    def _instance(self, key: str) -> Instance:
-        """The last instance is kept: the methods of a batch come one after another on it."""
-        if getattr(self, "_last", ("", None))[0] != key:
-            self._last = key, self.run.store.instance(key)
-        return self._last[1]
-
-
-def _suite(sweep: Sweep, dataset: Info, given: dict[str, Any]) -> Suite:
-    cells = tuple(
-        selection.format_selection(dataset.name, given | sweep.varied(x, y)) for x, y in np.ndindex(*sweep.shape)
-    )
-    title = f"{sweep.x.parameter} x {sweep.y.parameter}"
-    return Suite("map", title, cells, sweep.methods, sweep.seeds)
+            success = self.sweep.success.met(median, instance, self.parameters | self.sweep.varied(*sample[:2]))
+            self._medians_deg.setdefault((method, *sample[:2]), []).append(median)
+        self.tallies[method].add(sample, success)

@@ -99,7 +99,7 @@ def scores_of(results: Results, jobs: Sequence[Job]) -> Iterator[Score]:
             yield Score(
                 job.dataset,
                 job.instance,
-                spelled(job),
+                job.label,
                 job.seed,
                 row["status"],
                 row["stop_reason"] == ORACLE,
@@ -117,11 +117,6 @@ def one(kind: str, text: str) -> tuple[str, dict[str, Any]]:
 def label(kind: str, text: str) -> str:
     """The selection as a run spells it."""
     return selection.format_selection(*one(kind, text))
-
-
-def spelled(job: Job) -> str:
-    """The method of a job, as `label` spells it."""
-    return selection.format_selection(job.method, job.parameters)
 
 
 def extended(text: str, parameters: Mapping[str, Any]) -> str:

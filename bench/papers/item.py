@@ -2,8 +2,9 @@
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from bench.papers.computed import Computed
 from bench.papers.published import Sources
@@ -40,31 +41,35 @@ class Comparison(ABC):
         return None
 
     def text(self, style: str, *, width: int = 100, terminal: bool = False) -> tuple[str, tuple[str, ...]]:
-        """The table in a format, and the notes that are not in it; see `bench.reporting.tables.text.text_of`."""
-        from bench.reporting.tables.text import text_of
+        """The table in a format, and the notes that are not in it; see `bench.reporting.tables.render.text_of`."""
+        from bench.reporting.tables.render import text_of
 
         grid = self.printed() if style == "latex" else self.grid()
         return text_of(grid, self.frame(), style, width=width, terminal=terminal)
 
 
-class Item(Protocol):
-    """A table, figure or claim, as a layout describes it: a frozen dataclass of its keys."""
+class Item(ABC):
+    """A table, figure or claim, as a layout describes it: a frozen dataclass of its keys.
 
-    @property
-    def title(self) -> str:
-        """What it is, in the paper's words."""
+    Parameters
+    ----------
+    title
+        What it is, in the paper's words.
+    alignment
+        The rule that removes the gauge; "" where nothing is scored.
+    needs
+        What has to be scored besides estimates: ``oracle``, ``checkpoints``.
+    """
 
-    @property
-    def alignment(self) -> str:
-        """The rule that removes the gauge; "" where nothing is scored."""
+    title: str
+    alignment: str
+    needs: ClassVar[Collection[str]] = ()
 
-    @property
-    def needs(self) -> Collection[str]:
-        """What has to be scored besides estimates: ``oracle``, ``checkpoints``."""
-
+    @abstractmethod
     def suites(self, name: str) -> Sequence[Suite]:
         """What has to run, in suites of this name."""
 
+    @abstractmethod
     def compare(self, sources: Sources, computed: Computed) -> Comparison:
         """Put what was computed beside what is published.
 
@@ -73,3 +78,19 @@ class Item(Protocol):
         InputError
             Where the layout and the published numbers do not fit together.
         """
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredItem(Item):
+    """An item for which something has to run; `seeds`, `timeout_s` and `memory_gib` are as in a suite."""
+
+    title: str
+    alignment: str
+    seeds: int = 1
+    timeout_s: float = 600.0
+    memory_gib: float = 8.0
+
+    def suite(self, name: str, datasets: Iterable[str], methods: Iterable[str], seeds: int = 0) -> Suite:
+        """A suite within the limits of the item, with its number of seeds where no other is given."""
+        limits = seeds or self.seeds, self.timeout_s, self.memory_gib
+        return Suite(name, self.title, tuple(datasets), tuple(methods), *limits)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.core import typed
-from bench.core.errors import InputError, shown, suggestion
+from bench.core.errors import InputError, brief, shown, suggestion
 from bench.formats import toml_file
 from bench.papers import kinds
 from bench.papers.item import Item
@@ -75,7 +75,7 @@ def load_layout(name: str) -> Layout:
     stem, content = toml_file.read("paper", PAPERS, name)
     where = f"layout {name}"
     head = typed.read(_Head, {key: content.pop(key) for key in ("title", "cite") if key in content}, where)
-    items = {key: _item(f"{where}: {_brief(key)}", value) for key, value in content.items()}
+    items = {key: _item(f"{where}: {brief(key)}", value) for key, value in content.items()}
     beside = Path(name).parent
     sources = Sources(beside, beside) if name.endswith(".toml") else Sources.shipped()
     return Layout(stem, head.title or stem, head.cite, items, sources)
@@ -93,7 +93,3 @@ def _item(where: str, content: Any) -> Item:
     if item.alignment not in ("", *RULES):
         raise InputError(f"{where}: alignment is {shown(item.alignment)}{suggestion(item.alignment, RULES)}")
     return item
-
-
-def _brief(key: str) -> str:
-    return key if key.isprintable() and len(key) <= 80 else shown(key)

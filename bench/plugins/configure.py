@@ -1,12 +1,11 @@
 """From the parameters that were given to a configured method or dataset."""
 
 import dataclasses
-import types
 import typing
 from collections.abc import Mapping
-from functools import cache
 from typing import Any, TypeVar, cast
 
+from bench.core import typed
 from bench.core.errors import InputError, shown, suggestion
 from bench.plugins import selection
 
@@ -42,23 +41,19 @@ def configured(cls: type[T], parameters: Mapping[str, Any], what: str) -> T:
     InputError
         On an unknown parameter or a value of the wrong type or range.
     """
-    hints = _hints(cast(Any, cls))
-    fields = {f.name: f for f in dataclasses.fields(cast(Any, cls))}
+    hints = typed.fields_of(cast(Any, cls))
+    ranges = {f.name: f.metadata.get(_RANGE, {}) for f in dataclasses.fields(cast(Any, cls))}
     values = {}
     for key, value in parameters.items():
-        if key not in fields:
-            raise InputError(f"{what} has no parameter {shown(key)}{suggestion(key, fields)}")
-        values[key] = _coerced(value, hints[key], f"parameter '{key}' of {what}")
-        _check_range(values[key], fields[key].metadata.get(_RANGE, {}), f"parameter '{key}' of {what}")
+        if key not in hints:
+            raise InputError(f"{what} has no parameter {shown(key)}{suggestion(key, hints)}")
+        hint, at = hints[key][0], f"parameter '{key}' of {what}"
+        values[key] = typed.fitted(hint, str(value) if _is_text(hint, value) else value, at)
+        _check_range(values[key], ranges[key], at)
     try:
         return cls(**values)
     except ValueError as error:
         raise InputError(f"{what}: {error}") from error
-
-
-@cache
-def _hints(cls: Any) -> Mapping[str, Any]:
-    return typing.get_type_hints(cls)
 
 
 def parameters_of(configured: Any) -> dict[str, Any]:
@@ -68,7 +63,7 @@ def parameters_of(configured: Any) -> dict[str, Any]:
 
 def choices(cls: type, name: str) -> tuple[Any, ...]:
     """The values that a parameter may take, where its annotation lists them; else none."""
-    hint = typing.get_type_hints(cls).get(name)
+    hint, _ = typed.fields_of(cls).get(name, (None, False))
     return typing.get_args(hint) if typing.get_origin(hint) is typing.Literal else ()
 
 
@@ -91,28 +86,7 @@ def _check_range(value: Any, bounds: Mapping[str, float], what: str) -> None:
         raise InputError(f"{what} must be {wanted}, not {selection.format_value(value)}")
 
 
-def _coerced(value: Any, hint: Any, what: str) -> Any:
-    """`value` as the type of a field, or an error that says what the field takes."""
-    options = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
-    for option in options:
-        if typing.get_origin(option) is typing.Literal:
-            if value in typing.get_args(option):
-                return value
-        elif option in (None, type(None)):
-            if value is None:
-                return None
-        elif option is float and isinstance(value, int | float) and not isinstance(value, bool):
-            return float(value)
-        elif option is str and isinstance(value, int | float) and not isinstance(value, bool):
-            return str(value)
-        elif isinstance(value, option) and not (option is int and isinstance(value, bool)):
-            return value
-    takes = " or ".join(_spelled(option) for option in options)
-    given = selection.format_value(value)[:80]
-    raise InputError(f"{what} takes {takes}, not {given if given.isprintable() else shown(value)}")
-
-
-def _spelled(option: Any) -> str:
-    if typing.get_origin(option) is typing.Literal:
-        return " or ".join(selection.format_value(v) for v in typing.get_args(option))
-    return "none" if option in (None, type(None)) else option.__name__
+def _is_text(hint: Any, value: Any) -> bool:
+    """Whether a number is meant as text, for a selection has no quotes: the field takes text, and no number."""
+    options = {hint, *typing.get_args(hint)}
+    return str in options and not {int, float} & options and type(value) in (int, float)

@@ -22,7 +22,7 @@ def render_table(
     """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render.render`."""
     frame = appearance.current().ordered(results.frame)
     if style == "csv":
-        frame = with_intervals(frame, results.errors)
+        frame = with_intervals(frame, results.job_errors)
     return render.render(frame, results.ties, results.footnotes, style, width=width, terminal=terminal)
 
 
@@ -59,9 +59,8 @@ def drawings(results: Results) -> "dict[str, Drawing]":
 
 def write_plots(results: Results, folder: Path) -> list[Path]:
     """Draw every figure that the run has data for, as PNG, PDF and SVG; those for a paper with a file of captions."""
-    from bench.reporting.figures.captions import captions
     from bench.reporting.figures.paint_matplotlib import paint
-    from bench.reporting.figures.style import save
+    from bench.reporting.figures.style import captions, save
 
     folder.mkdir(parents=True, exist_ok=True)
     figures = {name: paint(drawing) for name, drawing in drawings(results).items()}

@@ -1,10 +1,9 @@
 """Score what a run has stored: the table of rows, the per-camera errors behind it, ties and footnotes."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pyarrow.compute as pc
@@ -16,6 +15,7 @@ from bench.scoring.cache import Scores, scores_of
 from bench.scoring.inference.seed_ties import MANY_SEEDS, tied_by_seed
 from bench.scoring.inference.statistics import tied
 from bench.scoring.information import notes_on_use
+from bench.scoring.metrics.alignment import RULES
 from bench.scoring.metrics.errors import summary
 from bench.scoring.metrics.oracle import ORACLE, Curve, curve
 from bench.scoring.metrics.speedup import speedup
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 Place = tuple[str, str, str]
 Configured = tuple[str, str]
+_Rows = dict[Configured, list[int]]
+Key = TypeVar("Key")
+Value = TypeVar("Value", covariant=True)
 PLACE = ["dataset", "instance", "protocol"]
 CONFIGURED = ["method", "params"]
 TIMES = ["round_s", "min_s", "waited"]
@@ -104,8 +107,11 @@ def score(
         jobs, scores = list(itertools.compress(jobs, fits)), scores.where(fits)
     frame = _frame(jobs, scores.table, rule)
     used = notes_on_use(frame, scores.table["offered"].to_pandas())
-    errors = CameraErrors(frame, scores)
-    ties = {place: _ties(errors, place, frame) for place in errors}
+    rows = _rows_with_truth(frame, scores.table)
+    ties = {place: _ties(scores, of_place, frame) for place, of_place in rows.items()}
+    errors = _Read(rows, lambda of_place: _errors(scores, of_place))
+    by_id = {jobs[row].id: row for of in rows.values() for own in of.values() for row in own}
+    job_errors = _Read(by_id, lambda row: scores.errors([row])[0])
     if "round_s" in frame:
         _compare_times(frame, plans[-1].baseline)
     curves: dict[Place, dict[Configured, list[Curve]]] = {}
@@ -122,56 +128,47 @@ def score(
         *scores.unreadable,
         *(plans[-1].missing if plans else ()),
     ]
-    return Results(frame, errors, ties, tuple(footnotes), rule, curves, JobErrors(scores))
+    return Results(frame, errors, ties, tuple(footnotes), rule, curves, job_errors)
 
 
-class JobErrors(Mapping[str, Floats]):
-    """Camera errors (n,) in degrees by job, for jobs that have ground truth; read when they are asked for."""
-
-    def __init__(self, scores: Scores) -> None:
-        self._scores = scores
-
-    @cached_property
-    def _rows(self) -> dict[str, int]:
-        ids, known = (self._scores.table[name].to_pylist() for name in ("job", "has_truth"))
-        return {job: row for row, (job, has_truth) in enumerate(zip(ids, known, strict=True)) if has_truth}
-
-    def __getitem__(self, job: str) -> Floats:
-        return self._scores.errors([self._rows[job]])[0]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._rows)
-
-    def __len__(self) -> int:
-        return len(self._rows)
+def under_every_rule(store: Store, results: Results) -> dict[str, Results]:
+    """The same run by alignment rule, that of `results` first; nothing is run, and no curves are scored."""
+    shown = set(results.frame["job"])
+    jobs = [job for job in store.jobs() if job.id in shown]
+    others = [rule for rule in RULES if rule != results.alignment]
+    return {results.alignment: results} | {rule: score(store, rule, jobs=jobs) for rule in others}
 
 
-class CameraErrors(Mapping[Place, Mapping[Configured, tuple[Floats, ...]]]):
-    """Camera errors of scored jobs, read when they are asked for.
+class _Read(Mapping[Key, Value]):
+    """Values that are read when they are asked for, by what is known of each key: there may be a million."""
 
-    For each place that has ground truth and each configured method, its errors (n,) in degrees, one array a seed.
-    """
+    def __init__(self, known: Mapping[Key, Any], read: Callable[[Any], Value]) -> None:
+        self._known = known
+        self._read = read
 
-    def __init__(self, frame: "pd.DataFrame", scores: Scores) -> None:
-        self._scores = scores
-        self.rows: dict[Place, dict[Configured, list[int]]] = {}
-        known = scores.table["has_truth"].to_numpy()
-        for row, (place, method) in enumerate(zip(_tuples(frame, PLACE), _tuples(frame, CONFIGURED), strict=True)):
-            if known[row]:
-                self.rows.setdefault(place, {}).setdefault(method, []).append(row)
+    def __getitem__(self, key: Key) -> Value:
+        return self._read(self._known[key])
 
-    def __getitem__(self, place: Place) -> dict[Configured, tuple[Floats, ...]]:
-        return self.of(place)
-
-    def of(self, place: Place, seeds: int | None = None) -> dict[Configured, tuple[Floats, ...]]:
-        """Errors of a place under the first so many seeds."""
-        return {method: tuple(self._scores.errors(rows[:seeds])) for method, rows in self.rows[place].items()}
-
-    def __iter__(self) -> Iterator[Place]:
-        return iter(self.rows)
+    def __iter__(self) -> Iterator[Key]:
+        return iter(self._known)
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self._known)
+
+
+def _rows_with_truth(frame: "pd.DataFrame", table: "pa.Table") -> dict[Place, _Rows]:
+    """Rows that have ground truth, by place and configured method."""
+    found: dict[Place, _Rows] = {}
+    places, methods = _tuples(frame, PLACE), _tuples(frame, CONFIGURED)
+    for row, (place, method, known) in enumerate(zip(places, methods, table["has_truth"].to_numpy(), strict=True)):
+        if known:
+            found.setdefault(place, {}).setdefault(method, []).append(row)
+    return found
+
+
+def _errors(scores: Scores, rows: _Rows, seeds: int | None = None) -> dict[Configured, tuple[Floats, ...]]:
+    """Camera errors (n,) in degrees of each configured method, one array for each of the first so many seeds."""
+    return {method: tuple(scores.errors(own[:seeds])) for method, own in rows.items()}
 
 
 def _tuples(frame: "pd.DataFrame", columns: Sequence[str]) -> Iterator[Any]:
@@ -264,16 +261,10 @@ def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
     """The row of an estimate's best checkpoint; what only its end has is left out."""
     pick = along.oracle
     count = len(along.iterations)
-    absent = dict.fromkeys(
-        (
-            *("peak_mib", "cost", "certificate", "roc_auc", "min_s"),
-            *("speedup", "speedup_low", "speedup_high"),
-            *(k for k in row if k.startswith(("residual", "cost_"))),
-        )
-    )
+    absent = ("peak_mib", "cost", "certificate", "roc_auc", "min_s", "speedup", "residual")
     return {
         **row,
-        **{name: value for name, value in absent.items() if name in row},
+        **{name: None for name in row if name.startswith(absent)},
         **({"round_s": ()} if "round_s" in row else {}),
         **summary(along.errors[pick]),
         "params": ",".join(filter(None, [row["params"], ORACLE])),
@@ -284,10 +275,9 @@ def _oracle_row(row: Mapping[str, Any], along: Curve) -> dict[str, Any]:
     }
 
 
-def _ties(errors: CameraErrors, place: Place, frame: "pd.DataFrame") -> set[Configured]:
-    rows = errors.rows[place]
+def _ties(scores: Scores, rows: _Rows, frame: "pd.DataFrame") -> set[Configured]:
     same_cameras = frame["instance_key"].iloc[np.concatenate(list(rows.values()))].nunique() == 1
     if same_cameras or max(map(len, rows.values())) <= MANY_SEEDS:
-        return tied(errors.of(place, MANY_SEEDS), same_cameras=same_cameras)
+        return tied(_errors(scores, rows, MANY_SEEDS), same_cameras=same_cameras)
     columns = frame[["seed", "median_deg", "mean_deg", "n_scored"]].to_numpy(dtype=float)
     return tied_by_seed({method: columns[of_method] for method, of_method in rows.items()})

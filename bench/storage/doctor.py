@@ -1,7 +1,7 @@
 """Find what is damaged, missing or left over in the folder of a run, and mend what can be mended."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,7 +40,9 @@ def examine(folder: Path) -> list[Finding]:
         Where the folder is no run.
     """
     store = Store.open(folder)
-    return [*_plans(store), *_records(store), *_instances(store), *_leftovers(store)]
+    plans = _unreadable(store.folder.glob("plans/*.json"), store.plan)
+    instances = _unreadable(store.folder.glob("instances/*"), lambda path: store.instance(path.name))
+    return [*plans, *_records(store), *instances, *_leftovers(store)]
 
 
 def repair(folder: Path, findings: list[Finding]) -> None:
@@ -61,10 +63,10 @@ def repair(folder: Path, findings: list[Finding]) -> None:
         store.add_plan(Plan("recovered", tuple(adopted), command=f"{program()} doctor --repair"))
 
 
-def _plans(store: Store) -> Iterator[Finding]:
-    for path in sorted(store.folder.glob("plans/*.json")):
+def _unreadable(paths: Iterable[Path], read: Callable[[Path], object]) -> Iterator[Finding]:
+    for path in sorted(paths):
         try:
-            store.plan(path)
+            read(path)
         except InputError as error:
             yield Finding(path, _reason(error), "aside")
 
@@ -98,14 +100,6 @@ def _records(store: Store) -> Iterator[Finding]:
     for path in sorted(store.folder.glob("estimates/*/*.npz")):
         if path.stem not in recorded:
             yield Finding(path, "an estimate without a record, left by a run that was killed", "remove")
-
-
-def _instances(store: Store) -> Iterator[Finding]:
-    for path in sorted(store.folder.glob("instances/*")):
-        try:
-            store.instance(path.name)
-        except InputError as error:
-            yield Finding(path, _reason(error), "aside")
 
 
 def _leftovers(store: Store) -> Iterator[Finding]:

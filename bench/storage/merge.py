@@ -1,5 +1,6 @@
 """Bring what several folders hold of a run together in one."""
 
+import contextlib
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -60,15 +61,15 @@ def merge(sources: Sequence[Path], into: Path) -> Merged:
 
 def _merge_record(source: Store, target: Store, job_id: str, merged: Merged) -> None:
     try:
-        theirs = source.record(job_id)
-        if theirs is None:
-            return
-        if theirs.outcome.ok:
-            source.estimate(job_id, theirs)
+        theirs = _whole(source, job_id)
     except InputError as error:
         merged.told.append(str(error))
         return
-    ours = _readable(target, job_id)
+    if theirs is None:
+        return
+    ours = None
+    with contextlib.suppress(InputError):
+        ours = _whole(target, job_id)
     if ours is not None and not _better(theirs, ours):
         merged.kept += 1
         if theirs.outcome.ok and ours.outcome.ok and _differ(source, target, job_id):
@@ -85,13 +86,10 @@ def _merge_record(source: Store, target: Store, job_id: str, merged: Merged) -> 
         merged.replaced += 1
 
 
-def _readable(store: Store, job_id: str) -> Record | None:
-    try:
-        record = store.record(job_id)
-        if record is not None and record.outcome.ok:
-            store.estimate(job_id, record)
-    except InputError:
-        return None
+def _whole(store: Store, job_id: str) -> Record | None:
+    record = store.record(job_id)
+    if record is not None and record.outcome.ok:
+        store.estimate(job_id, record)
     return record
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from bench.core import outcome
 from bench.core.errors import InputError, suggestion
-from bench.papers.computed import extended, label, spelled
+from bench.papers.computed import extended, label
 from bench.papers.explain.measure import Answer, Measure
 from bench.papers.explain.switches import Explained, Setting, explain, switches
 from bench.papers.item import Item
@@ -48,12 +48,12 @@ def explanations(
     item.check(published)
     rule = alignment or item.alignment
     for scene, column in dict.fromkeys(cell for name in names for cell in cells(name, item, published)):
-        runs, missing = run_all(suites_of(item, scene, column, layout.name), options, run)
+        runs, missing = run_all(_suites(item, scene, column, layout.name), options, run)
         if not runs:
             raise InputError(f"--explain '{scene}': {'; '.join(missing)}")
         jobs = [cell.job for planned in runs for cell in planned.cells]
         printed = next(row[column] for row in published if row[SCENE] == scene)
-        yield explain_cell(item, scene, column, printed, rule, jobs, runs[0].store)
+        yield _explained(item, scene, column, printed, rule, jobs, runs[0].store)
 
 
 def cells(text: str, table: SceneTable, published: Sequence[Mapping[str, str]]) -> list[tuple[str, str]]:
@@ -99,42 +99,23 @@ def _named(text: str, names: Mapping[str, str], kind: str) -> str:
     raise InputError(f"--explain: the table has no {kind} '{text}'{suggestion(text, names)}; the form is {FORM}")
 
 
-def suites_of(table: SceneTable, scene: str, column: str, name: str) -> tuple[Suite, ...]:
-    """What has to run to explain a cell: every candidate as the table has it, ours under the other protocols.
-
-    Parameters
-    ----------
-    table, scene, column
-        The cell, as `cells` spells it.
-    name
-        Of the suites.
-    """
+def _suites(table: SceneTable, scene: str, column: str, name: str) -> tuple[Suite, ...]:
+    """What has to run to explain a cell: every candidate as the table has it, ours under the other protocols."""
     data = extended(table.dataset, {table.scene_parameter: table.scenes[scene]})
-    limits = table.seeds, table.timeout_s, table.memory_gib
     wanted = [(data, candidates(table, column))]
     wanted += [(extended(data, {PROTOCOL: other}), candidates(table, column)[:1]) for other in _other(table)]
-    return tuple(Suite(name, table.title, (dataset,), methods, *limits) for dataset, methods in wanted)
+    return tuple(table.suite(name, [dataset], methods) for dataset, methods in wanted)
 
 
-def explain_cell(
+def _explained(
     table: SceneTable, scene: str, column: str, published: str, alignment: str, jobs: Sequence[Job], store: Store
 ) -> Explained:
-    """Explain a cell from what is stored; nothing is run.
-
-    Parameters
-    ----------
-    table, scene, column
-        The cell, as `cells` spells it.
-    published, alignment
-        Its number as printed, and the rule that it is measured by.
-    jobs, store
-        The jobs of `suites_of`, and where their estimates are.
-    """
+    """Explain a cell, by its number as printed, from what is stored of the jobs of `_suites`; nothing is run."""
 
     def answers(method: str, protocol: str) -> tuple[Sequence[Answer], str]:
         found, status = [], []
         for job in jobs:
-            if spelled(job) == method and _protocol(job.dataset) == protocol:
+            if job.label == method and _protocol(job.dataset) == protocol:
                 record = store.record(job.id)
                 status.append(record.outcome.text if record else outcome.NOT_RUN)
                 if record and record.outcome.ok:

@@ -85,10 +85,32 @@ class Explained(Comparison):
         return min(reached, key=lambda row: row.gap_after, default=None)
 
     def grid(self) -> "Grid":
-        """A row for each switch, those that come closest first."""
-        from bench.papers.explain.grid import explained_grid
+        """A row for each switch, those that come closest first; the closest is bold where it helps."""
+        from bench.reporting.tables.grid import ABSENT, Cell, Grid, abbreviated
 
-        return explained_grid(self)
+        def gap(value: float) -> float:
+            return value if math.isfinite(value) else math.inf
+
+        def number(value: float, sign: str = "") -> str:
+            if not math.isfinite(value):
+                return ABSENT
+            return f"{round(value, 3) or 0:{sign if round(value, 3) else ''}.3f}".replace("-", "−")
+
+        def cells(row: Tried) -> tuple[Cell, ...]:
+            measured = number(row.measured) if math.isfinite(row.measured) else abbreviated(row.status)
+            gaps = (number(row.gap_before), number(row.gap_after), number(row.gap_after - row.gap_before, "+"))
+            return Cell(measured, row.gap_after == closest < row.gap_before), *map(Cell, gaps)
+
+        rows = sorted(self.rows, key=lambda row: gap(row.gap_after))
+        closest = min((gap(row.gap_after) for row in rows), default=math.inf)
+        return Grid(
+            caption=f"{self.scene} / {self.column}: measured {self.measured:.3f} ({self.alignment} alignment), "
+            f"published {self.published}; every row changes one thing",
+            facts=("switch", "from", "to"),
+            methods=(("measured", ""), ("gap before", ""), ("gap after", ""), ("change", "")),
+            rows=tuple(((row.switch, row.before, row.after), cells(row)) for row in rows),
+            notes=(self.sentence(),),
+        )
 
     def sentence(self) -> str:
         """Which single switch moves our number closest to the published one, or that none does."""

@@ -1,12 +1,12 @@
 """A published table of what methods need, beside what our methods declare."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from bench.core.errors import InputError, suggestion
 from bench.papers.computed import Computed, one
-from bench.papers.item import Comparison
+from bench.papers.item import Comparison, Item
 from bench.papers.published import Sources
 from bench.plugins.catalog import catalog
 from bench.suite.experiment import Suite
@@ -18,13 +18,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class PropertyTable:
+class PropertyTable(Item):
     """Layout of such a table.
 
     Parameters
     ----------
-    title
-        What the table is.
     columns
         Heading of each column, and the name of the fact that a method declares.
     published
@@ -38,8 +36,7 @@ class PropertyTable:
     published: Mapping[str, Mapping[str, bool]]
     declared: Mapping[str, str]
 
-    alignment: ClassVar[str] = ""
-    needs: ClassVar[Collection[str]] = ()
+    alignment = ""
 
     def suites(self, name: str) -> tuple[Suite, ...]:
         """Nothing has to run."""

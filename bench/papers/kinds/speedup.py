@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.core.errors import InputError
 from bench.papers.computed import Computed, label
-from bench.papers.item import Comparison
+from bench.papers.item import Comparison, MeasuredItem
 from bench.papers.published import Sources
 from bench.plugins import selection
 from bench.scoring.metrics.oracle import ORACLE
@@ -21,13 +21,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Speedup:
+class Speedup(MeasuredItem):
     """Layout of such a comparison.
 
     Parameters
     ----------
-    title
-        What it is.
     dataset
         Selection of one instance.
     method
@@ -37,30 +35,20 @@ class Speedup:
     curves, chosen
         File of errors along the recipe's iterations, in ``results/reference``, and the values that some of its columns
         have for this recipe; it has the columns ``iteration, mean_deg, median_deg`` besides.
-    alignment
-        The rule that removes the gauge.
-    seeds, timeout_s, memory_gib
-        As in a suite.
     """
 
-    title: str
     dataset: str
     method: str
     recipe: str
     iterations: int
     curves: str
     chosen: Mapping[str, int]
-    alignment: str
-    seeds: int = 1
-    timeout_s: float = 600.0
-    memory_gib: float = 8.0
 
     needs: ClassVar[Collection[str]] = ("checkpoints",)
 
     def suites(self, name: str) -> tuple[Suite, ...]:
         """What has to run; the two methods one after the other, on the same data."""
-        methods = (self.method, self.recipe)
-        return (Suite(name, self.title, (self.dataset,), methods, self.seeds, self.timeout_s, self.memory_gib),)
+        return (self.suite(name, [self.dataset], [self.method, self.recipe]),)
 
     def compare(self, sources: Sources, computed: Computed) -> "Ratio":
         """Time and errors of the method, of the recipe, and their ratio; nothing where the data are not on disk.
@@ -139,7 +127,7 @@ class Ratio(Comparison):
     def grid(self) -> "Grid":
         """A row for each of the two."""
         from bench.reporting.tables.grid import Cell, Grid
-        from bench.reporting.tables.rows import degrees
+        from bench.reporting.tables.printed import degrees
 
         def texts(row: Side) -> tuple[str, ...]:
             times = f"{row.iterations}", f"{1e3 * row.iteration_s:.2f}", f"{row.total_s:.3g}"

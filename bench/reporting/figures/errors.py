@@ -14,7 +14,8 @@ import pandas as pd
 from bench.core.problem import Floats
 from bench.reporting.figures.data import QUANTILES, Axis, Chart, Heat, Panel, Series, Spread, Spreads
 from bench.reporting.figures.looks import GREY, Look, Looks
-from bench.reporting.tables.rows import Scene, degrees, times_note
+from bench.reporting.tables.printed import degrees
+from bench.reporting.tables.rows import Scene, times_note
 from bench.reporting.tables.standing import Standing, geometric_mean
 from bench.scoring.metrics.oracle import Curve
 from bench.scoring.results import Configured, Place

@@ -1,8 +1,8 @@
-"""The page that figures are drawn on: fonts, panels, legends, titles; and how a figure is saved."""
+"""The page that figures are drawn on: fonts, panels, legends, titles, captions; and how a figure is saved."""
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from bench.reporting import appearance
 from bench.reporting.figures.looks import GREY
+from bench.reporting.tables.latex import latex_escape
 
 FORMATS = ("png", "pdf", "svg")
 SETTINGS: dict[Any, Any] = {
@@ -105,6 +106,19 @@ def describe(figure: Figure, title: str, caption: str) -> None:
 def described(figure: Figure) -> tuple[str, str]:
     """Title and caption of a figure."""
     return figure.get_suptitle(), " ".join(figure.get_supxlabel().split())
+
+
+def captions(figures: Mapping[str, Figure]) -> str:
+    r"""LaTeX ``figure`` environments, by file name; the document needs ``\usepackage{graphicx}``."""
+    blocks = ["% needs \\usepackage{graphicx}"]
+    for name, figure in figures.items():
+        title, caption = described(figure)
+        star = "*" if figure.get_figwidth() > 4 else ""
+        blocks.append(
+            f"\\begin{{figure{star}}}[htbp]\n\\centering\n\\includegraphics{{{name}.pdf}}\n"
+            f"\\caption{{{latex_escape(title)}. {latex_escape(caption)}}}\n\\end{{figure{star}}}"
+        )
+    return "\n\n".join(blocks) + "\n"
 
 
 def log_axis(axis: Any, low: float, high: float, ticks: Sequence[float]) -> None:

@@ -11,7 +11,7 @@ from bench.reporting.figures.paint_plotly import FigureDict, dash
 from bench.reporting.html import words
 from bench.reporting.html.case import Case, Solved
 from bench.reporting.html.section import Section, Table, Value, anchor
-from bench.reporting.tables.rows import area
+from bench.reporting.tables.printed import area
 from bench.scoring.metrics.cycles import WRONG_DEG, agreeing_share, sample_cycles
 from bench.scoring.metrics.roc import roc_curve
 

@@ -49,6 +49,17 @@ COLUMNS = (
     Column("best_on", "Best on", "text", "Scenes on which it is among the best"),
     Column("outcome", "Outcome", "text", "How the jobs ended"),
 )
+NUMBERS = {
+    "median": "median_deg",
+    "mean": "mean_deg",
+    "p90": "p90_deg",
+    "within": "within_5_deg",
+    "residual": "residual_median_deg",
+    "auc": "roc_auc",
+    "time": "solve_s",
+    "speedup": "speedup",
+    "memory": "peak_mib",
+}  # columns of a run's frame
 
 
 def leaderboard(by_rule: Mapping[str, Results]) -> dict[str, Any]:
@@ -105,25 +116,13 @@ def _overall(scenes: Sequence[Scene], ranks: Mapping[Configured, float]) -> Iter
 
 
 def _row(scene: Scene, name: str, entry: Entry, rank: float | None) -> dict[str, Any]:
-    def value(key: str) -> float | int | None:
-        return rounded(entry.value(key).mean)
-
-    return {
+    return {key: rounded(entry.value(name).mean) for key, name in NUMBERS.items()} | {
         "method": entry.label,
         "scene": name,
         "protocol": scene.protocol,
         "alignment": scene.alignment,
         "outcome": entry.failure or "ok",
         "rank": rounded(rank) if rank is not None and entry.ok and entry.scored else None,
-        "median": value("median_deg"),
-        "mean": value("mean_deg"),
-        "p90": value("p90_deg"),
-        "within": value("within_5_deg"),
-        "residual": value("residual_median_deg"),
-        "auc": value("roc_auc"),
-        "time": value("solve_s"),
-        "speedup": value("speedup"),
-        "memory": value("peak_mib"),
         "cameras": f"{entry.solved}/{entry.scored}/{scene.cameras}" if entry.ok else None,
         "best": entry.best,
         "failed": entry.outcomes,

@@ -19,10 +19,10 @@ def origin(store: Store, job_ids: Iterable[str]) -> Facts:
         ("Finished", (f"{finished[0]} to {finished[-1]}",) if finished else ()),
         ("Machine", _distinct(map(_machine, records))),
         ("Benchmark", _distinct(map(_code, records))),
-        ("Python", _distinct(record.provenance.get("python", "") for record in records)),
-        ("Packages", _packages(records)),
-        ("Limits of a job", _distinct(map(_limits, records))),
-        ("Threads of a job", _distinct(str(record.limits.threads) for record in records)),
+        ("Python", _distinct(r.provenance.get("python", "") for r in records)),
+        ("Packages", _distinct(f"{name} {version}" for r in records for name, version in sorted(r.versions.items()))),
+        ("Limits of a job", _distinct(f"{r.limits.seconds:g} s, {r.limits.memory_gib:g} GiB" for r in records)),
+        ("Threads of a job", _distinct(str(r.limits.threads) for r in records)),
     ]
     return [(name, values) for name, values in facts if values]
 
@@ -38,11 +38,3 @@ def _machine(record: Record) -> str:
 def _code(record: Record) -> str:
     git = record.provenance.get("git", "")
     return f"{record.provenance.get('bench', '')}{f', git {git}' if git else ''}"
-
-
-def _limits(record: Record) -> str:
-    return f"{record.limits.seconds:g} s, {record.limits.memory_gib:g} GiB"
-
-
-def _packages(records: Iterable[Record]) -> tuple[str, ...]:
-    return _distinct(f"{name} {version}" for record in records for name, version in sorted(record.versions.items()))

@@ -15,14 +15,15 @@ from bench.reporting.figures.errors import Run
 from bench.reporting.figures.looks import looks_by_selection
 from bench.reporting.html import overview, reversals, words
 from bench.reporting.html.embed import compact
-from bench.reporting.html.failures import Failure, failures, notes
+from bench.reporting.html.failures import failures, notes
 from bench.reporting.html.leaderboard import leaderboard
-from bench.reporting.html.origin import Facts, origin
+from bench.reporting.html.origin import origin
 from bench.reporting.html.scene import sections as forensics
-from bench.reporting.html.section import Section, Table, Value, anchor
+from bench.reporting.html.section import Section, Value, anchor
 from bench.reporting.tables.rows import Scene, is_timed
 from bench.reporting.tables.rows import scenes as scenes_of
 from bench.reporting.tables.standing import overall
+from bench.scoring.inference.dominance import clearly_better
 from bench.scoring.results import Results
 from bench.storage.store import Store
 
@@ -47,7 +48,7 @@ def write_report(store: Store, by_rule: Mapping[str, Results], path: Path) -> Pa
     store
         The run.
     by_rule
-        The run scored under one or more alignment rules, see `bench.reporting.html.realign`; the report is about
+        The run scored under one or more alignment rules, see `bench.scoring.results`; the report is about
         the first, the others are in the leaderboard and tell whether the choice matters.
     path
         The file, replaced where it exists.
@@ -91,7 +92,7 @@ def _flags(
 ) -> list[tuple[bool, str]]:
     """Sentence on each choice that was varied, and whether it matters."""
     found: list[tuple[bool, str]] = []
-    better = {rule: reversals.better_pairs(results) for rule, results in by_rule.items()}
+    better = {rule: {at: clearly_better(own) for at, own in r.errors.items()} for rule, r in by_rule.items()}
     if len(by_scene) > 1 and any(e.scored for s in scenes for e in s.entries):
         found += words.depends("alignment", by_scene, reversals.by_alignment(by_scene, better))
     protocols = list(dict.fromkeys(scene.protocol for scene in scenes))
@@ -150,20 +151,8 @@ def _unique(name: str, used: set[str]) -> str:
     return found
 
 
-def _html(
-    *,
-    title: str,
-    summary: Sequence[str],
-    flags: Sequence[tuple[bool, str]],
-    dependence: Table | None,
-    sections: Sequence[Section],
-    scenes: Sequence[ScenePage],
-    failures: Sequence[Failure],
-    notes: Sequence[tuple[str, str, str]],
-    footnotes: Sequence[str],
-    origin: Facts,
-    data: Mapping[str, Any],
-) -> str:
+def _html(data: Mapping[str, Any], **content: Any) -> str:
+    """The page of these data, with what its template says of the `content`."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from jinja2.utils import htmlsafe_json_dumps
     from markupsafe import Markup
@@ -179,16 +168,7 @@ def _html(
     scripts = [_asset("theme.js"), _plotly(), _asset("page.js")]
     embedded = {key: htmlsafe_json_dumps(value, dumps=_dumps) for key, value in data.items()}
     return environment.get_template("page.html").render(
-        title=title,
-        summary=summary,
-        flags=flags,
-        dependence=dependence,
-        sections=sections,
-        scenes=scenes,
-        failures=failures,
-        notes=notes,
-        footnotes=footnotes,
-        origin=origin,
+        **content,
         data=embedded,
         policy=_policy(scripts),
         style=Markup(_asset("style.css")),

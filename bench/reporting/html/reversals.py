@@ -6,9 +6,8 @@ from itertools import combinations
 
 from bench.reporting.tables.rows import Entry, Scene
 from bench.reporting.tables.standing import ended_well
-from bench.scoring.inference.dominance import clearly_better
 from bench.scoring.inference.resampling import FLOOR_DEG
-from bench.scoring.results import Configured, Place, Results
+from bench.scoring.results import Configured, Place
 
 MARGIN = 1.05  # medians closer than this ratio are not an order
 Better = Mapping[Place, Set[tuple[Configured, Configured]]]  # pairs of which the first is better beyond chance
@@ -38,11 +37,6 @@ class Reversal:
     behind: str
     medians: tuple[float, float, float, float]
     at_the_top: bool
-
-
-def better_pairs(results: Results) -> Better:
-    """Beyond chance, by place."""
-    return {place: clearly_better(errors) for place, errors in results.errors.items()}
 
 
 def by_alignment(scenes_by_rule: Mapping[str, Sequence[Scene]], better: Mapping[str, Better]) -> list[Reversal]:

@@ -9,7 +9,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from bench.reporting.html.reversals import Reversal
-from bench.reporting.tables.rows import Entry, Scene, degrees
+from bench.reporting.tables.printed import degrees
+from bench.reporting.tables.rows import Entry, Scene
 from bench.reporting.tables.standing import Standing, geometric_mean
 
 NEAR_DEG = 0.1  # a method this close to the leader's median, on every scene, is as good for most purposes
@@ -19,12 +20,8 @@ NAMED = 4  # names in a list before "and 3 more"
 
 def summary(scenes: Sequence[Scene], standings: Sequence[Standing], timed: bool = False) -> list[str]:
     """What was compared, who is best, who is faster, and what failed, a sentence or two each."""
-    found = [what_was_compared(scenes)]
-    found += who_is_best(scenes, standings)
-    found += who_is_faster(scenes, standings, timed)
-    found.append(what_failed(scenes))
-    found += caveats(scenes)
-    return found
+    first = [what_was_compared(scenes), *who_is_best(scenes, standings), *who_is_faster(scenes, standings, timed)]
+    return [*first, what_failed(scenes), *caveats(scenes)]
 
 
 def what_was_compared(scenes: Sequence[Scene]) -> str:
@@ -179,7 +176,7 @@ def _most_often_best(scenes: Sequence[Scene]) -> tuple[tuple[str, ...], int]:
 
 def _order_depends(what: str, found: Sequence[Reversal]) -> str:
     """The clearest pair that changes its order, at the top where there is one there, and how many there are."""
-    clearest = max((r for r in found if r.at_the_top == found[0].at_the_top), key=lambda r: _strength(r.medians))
+    clearest = max((r for r in found if r.at_the_top == found[0].at_the_top), key=_strength)
     a, b, c, d = map(degrees, clearest.medians)
     under, other = clearest.choices
     pairs = len({(r.scene, r.ahead, r.behind) for r in found})
@@ -233,9 +230,9 @@ def _times(ratio: float) -> str:
     return f"{ratio:.0f} times" if ratio >= 10 else f"{ratio:.1f} times"
 
 
-def _strength(medians: tuple[float, float, float, float]) -> float:
-    """How clear a reversal is: the smaller of its two ratios."""
-    return min(medians[1] / medians[0], medians[2] / medians[3])
+def _strength(reversal: Reversal) -> float:
+    """How clear it is: the smaller of its two ratios."""
+    return min(reversal.medians[1] / reversal.medians[0], reversal.medians[2] / reversal.medians[3])
 
 
 def _last(value: float) -> float:

@@ -6,7 +6,7 @@ import pandas as pd
 
 from bench.plugins.selection import label
 from bench.reporting.tables.grid import ABSENT, Cell, Grid
-from bench.reporting.tables.rows import degrees, exact_seconds
+from bench.reporting.tables.printed import degrees, exact_seconds
 from bench.scoring.comparison import IDENTICAL, TIME, Comparison
 
 WORDS = {"all": "all methods", "method": "over all scenes"}

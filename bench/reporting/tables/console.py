@@ -11,21 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from bench.reporting.tables.grid import Grid
-from bench.reporting.tables.rows import (
-    ROC_LEGEND,
-    TIE_LEGEND,
-    Entry,
-    Scene,
-    Ties,
-    area,
-    degrees,
-    exact_seconds,
-    is_timed,
-    scenes,
-    seconds,
-    speedup,
-    times_note,
-)
+from bench.reporting.tables.printed import area, degrees, exact_seconds, seconds, speedup
+from bench.reporting.tables.rows import ROC_LEGEND, TIE_LEGEND, Entry, Scene, Ties, is_timed, scenes, times_note
 
 NO_TRUTH = " · no ground truth: edge residuals, not errors"
 WIDE = 96  # columns from which the 90th percentile and the share under 5 degrees fit
@@ -35,10 +22,14 @@ def render_console(
     frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str], *, width: int = 100, terminal: bool = False
 ) -> str:
     """Text of the table, with escape codes for bold where it is for a terminal."""
-    return _printed(console_blocks(frame, ties, footnotes, width=width), width, terminal)
+    timed = is_timed(frame)
+    blocks = [part for scene in scenes(frame, ties) for part in _block(scene, width, timed)]
+    legend = (Text(line, style="dim") for line in _legend(frame))
+    notes = [Text(), *(Text(f"- {note}") for note in footnotes)] if footnotes else []
+    return _printed(Group(*blocks, *legend, *notes), width, terminal)
 
 
-def render_grid(grid: Grid, footnotes: Sequence[str] = (), *, width: int = 100, terminal: bool = False) -> str:
+def render_grid(grid: Grid, *, width: int = 100, terminal: bool = False) -> str:
     """Text of a table of another shape; what is bold is marked with an asterisk too."""
     table = _empty_table()
     for name in grid.facts:
@@ -51,7 +42,7 @@ def render_grid(grid: Grid, footnotes: Sequence[str] = (), *, width: int = 100, 
         ends = k + 1 == len(grid.rows) or bool(grid.rows[k + 1][0][0])
         table.add_row(*map(Text, facts), *map(Text, shown), end_section=ends and not facts[0])
     notes = (Text(line, style="dim") for line in grid.notes)
-    return _printed(Group(Text(grid.caption, style="bold"), table, *notes, *_notes(footnotes)), width, terminal)
+    return _printed(Group(Text(grid.caption, style="bold"), table, *notes), width, terminal)
 
 
 def _printed(drawn: RenderableType, width: int, terminal: bool) -> str:
@@ -59,15 +50,6 @@ def _printed(drawn: RenderableType, width: int, terminal: bool) -> str:
     with console.capture() as capture:
         console.print(drawn)
     return "\n".join(line.rstrip() for line in capture.get().splitlines()) + "\n"
-
-
-def console_blocks(
-    frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str] = (), *, width: int = 100
-) -> RenderableType:
-    """The same as something rich can draw, for a live display."""
-    timed = is_timed(frame)
-    blocks = [part for scene in scenes(frame, ties) for part in _block(scene, width, timed)]
-    return Group(*blocks, *(Text(line, style="dim") for line in _legend(frame)), *_notes(footnotes))
 
 
 def _block(scene: Scene, width: int, timed: bool) -> Iterator[RenderableType]:
@@ -173,7 +155,3 @@ def _legend(frame: pd.DataFrame) -> list[str]:
     if "roc_auc" in frame and frame["roc_auc"].notna().any():
         lines.append(f"AUC: {ROC_LEGEND}")
     return lines
-
-
-def _notes(footnotes: Sequence[str]) -> list[RenderableType]:
-    return [Text(), *(Text(f"- {note}") for note in footnotes)] if footnotes else []

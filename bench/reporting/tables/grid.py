@@ -11,19 +11,8 @@ from dataclasses import dataclass
 import pandas as pd
 
 from bench.reporting import appearance
-from bench.reporting.tables.rows import (
-    ROC_LEGEND,
-    TIE_LEGEND,
-    Entry,
-    Scene,
-    Ties,
-    area,
-    degrees,
-    exact_seconds,
-    scenes,
-    speedup,
-    times_note,
-)
+from bench.reporting.tables.printed import area, degrees, exact_seconds, speedup
+from bench.reporting.tables.rows import ROC_LEGEND, TIE_LEGEND, Entry, Scene, Ties, scenes, times_note
 from bench.scoring.results import Configured
 
 ABBREVIATIONS = {

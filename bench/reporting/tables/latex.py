@@ -83,11 +83,8 @@ def latex_escape(text: str) -> str:
 def _split(grid: Grid) -> list[Grid]:
     """The same table in equal parts that fit a page's width; the notes go below the last."""
     most = max(len(grid.methods), 1)
-    return next(parts for count in range(1, most + 1) if (parts := _parts(grid, count)) and _fit(parts, count == most))
-
-
-def _fit(parts: Sequence[Grid], last: bool) -> bool:
-    return last or max(map(_width_pt, parts)) <= PAGE_PT
+    tried = (_parts(grid, count) for count in range(1, most + 1))
+    return next(parts for parts in tried if len(parts) == most or max(map(_width_pt, parts)) <= PAGE_PT)
 
 
 def _parts(grid: Grid, count: int) -> list[Grid]:

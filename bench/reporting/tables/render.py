@@ -1,11 +1,15 @@
 """Tables of a scored run: for the terminal, for Markdown, for a paper, and the long one for a spreadsheet."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from bench.core.errors import InputError, suggestion
 from bench.reporting.tables.rows import Ties
+
+if TYPE_CHECKING:
+    from bench.reporting.tables.grid import Grid
 
 FORMATS = ("console", "markdown", "csv", "latex")
 COLUMNS = (
@@ -74,8 +78,27 @@ def render(
 
         return render_console(frame, ties, footnotes, width=width, terminal=terminal), ()
     if style in ("markdown", "latex"):
-        from bench.reporting.tables.grid import grids, markdown
-        from bench.reporting.tables.latex import latex
+        from bench.reporting.tables.grid import grids
 
-        return (markdown if style == "markdown" else latex)(grids(frame, ties), footnotes), ()
+        return _written(grids(frame, ties), style, footnotes), ()
     raise InputError(f"there is no table format '{style}'{suggestion(style, FORMATS)}")
+
+
+def text_of(
+    grid: "Grid", frame: pd.DataFrame, style: str, *, width: int = 100, terminal: bool = False
+) -> tuple[str, tuple[str, ...]]:
+    """Another table in a format, with the frame behind it for ``csv``; and the notes that are not in it (then all)."""
+    if style == "csv":
+        return frame.to_csv(index=False), grid.notes
+    if style == "console":
+        from bench.reporting.tables.console import render_grid
+
+        return render_grid(grid, width=width, terminal=terminal), ()
+    return _written([grid], style), ()
+
+
+def _written(tables: "Sequence[Grid]", style: str, footnotes: Sequence[str] = ()) -> str:
+    from bench.reporting.tables.grid import markdown
+    from bench.reporting.tables.latex import latex
+
+    return (markdown if style == "markdown" else latex)(tables, footnotes)

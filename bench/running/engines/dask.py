@@ -161,9 +161,8 @@ class Supervisor(WorkerPlugin):
     def setup(self, worker: Worker) -> None:
         """On the worker: get ready."""
         if self.own:
-            signal.signal(
-                signal.SIGINT, signal.SIG_IGN
-            )  # Ctrl-C in a terminal reaches all; the client ends its workers
+            # Ctrl-C in a terminal reaches all; the client ends its workers
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         self.launcher = Launcher(self.limits.threads)
         self.folders = WorkFolders(self.store)
         self.stop = threading.Event()

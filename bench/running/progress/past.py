@@ -33,9 +33,10 @@ class Past:
         wanted = {cell.job.method for cell in planned.cells}
         for store in self.stores:
             by_method: dict[str, list[Job]] = {}
-            for job in _jobs(store):
-                if job.method in wanted and (job.rounds > 0) == planned.options.timing:
-                    by_method.setdefault(self.task(job).configured, []).append(job)
+            with contextlib.suppress(InputError):  # plans that cannot be read tell nothing
+                for job in store.jobs():
+                    if job.method in wanted and (job.rounds > 0) == planned.options.timing:
+                        by_method.setdefault(self.task(job).configured, []).append(job)
             for jobs in by_method.values():
                 self._read(store, jobs, MOST_RECORDS // len(by_method))
 
@@ -73,11 +74,3 @@ def _beside(folder: Path) -> Iterator[Store]:
         if sum(file.stat().st_size for file in (path / "plans").rglob("*") if file.is_file()) <= MOST_PLANNED:
             with contextlib.suppress(InputError):
                 yield Store.open(path)
-
-
-def _jobs(store: Store) -> list[Job]:
-    """Jobs that a run has planned; none where its plans cannot be read."""
-    try:
-        return store.jobs()
-    except InputError:
-        return []

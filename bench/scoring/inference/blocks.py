@@ -114,7 +114,9 @@ def _table(frame: "pd.DataFrame", column: str, floor: float) -> _Table:
     most = scored.groupby([frame[name] for name in ("dataset", "instance", "protocol")]).transform("max")
     whole = (frame["outcome"] == outcome.OK) & (scored > 0) & (scored >= MIN_COVERAGE * most)
     value = np.log(pd.to_numeric(frame[column], errors="coerce").clip(lower=floor)).where(whole, np.inf)
-    rows = frame[["dataset", "instance", "method", "params"]].assign(draw=_draws(frame), value=value.fillna(np.inf))
+    instances = frame.groupby([*_PLACE, "protocol"])["instance_key"].transform("nunique")
+    draw = frame["seed"].where(instances > 1, -1)  # the seed where the instance changes with it
+    rows = frame[["dataset", "instance", "method", "params"]].assign(draw=draw, value=value.fillna(np.inf))
     rows = rows[(most > 0) & ~frame["outcome"].isin(_DID_NOT_RUN)]
     means = rows.groupby([*_PLACE, "draw", "method", "params"], sort=False)["value"].mean()
     keys = [(str(d), str(i), int(draw), str(m), str(p)) for d, i, draw, m, p in means.index]
@@ -136,9 +138,3 @@ def _blocks(table: _Table) -> Blocks:
         tuple(map(scenes.index, table.places)),
         tuple(compress(table.methods, (not whole for whole in complete))),
     )
-
-
-def _draws(frame: "pd.DataFrame") -> "pd.Series":
-    """The seed where the instance changes with it, otherwise -1."""
-    instances = frame.groupby([*_PLACE, "protocol"])["instance_key"].transform("nunique")
-    return frame["seed"].where(instances > 1, -1)

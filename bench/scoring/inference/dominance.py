@@ -6,7 +6,8 @@ from typing import TypeVar
 import numpy as np
 
 from bench.core.problem import Floats
-from bench.scoring.inference.resampling import FLOOR_DEG, Statistic
+from bench.scoring.inference.difference import LEVEL
+from bench.scoring.inference.resampling import FLOOR_DEG
 from bench.scoring.inference.statistics import MIN_CAMERAS, MIN_COVERAGE, RESOLUTION
 
 Key = TypeVar("Key", bound=Hashable)
@@ -14,25 +15,20 @@ Key = TypeVar("Key", bound=Hashable)
 RESAMPLES = 400
 
 
-def clearly_better(
-    errors: Mapping[Key, Sequence[Floats]], statistic: Statistic = "median", level: float = 0.05
-) -> set[tuple[Key, Key]]:
-    """Pairs (a, b) on one instance where a is better than b, and not by chance.
+def clearly_better(errors: Mapping[Key, Sequence[Floats]]) -> set[tuple[Key, Key]]:
+    """Pairs (a, b) on one instance where the median of a is better than that of b, and not by chance.
 
     A paired bootstrap: each resample draws the same seeds and cameras for all methods, and a is clearly better where
-    its statistic is lower by more than a ratio of 1 + `RESOLUTION` in all but `level` / 2 of the resamples. The level
-    holds for each pair; a *reversal*, which takes two errors in opposite directions on nearly the same data, comes
-    about by chance far more rarely.
+    its median over the cameras, averaged geometrically over the seeds, is lower by more than a ratio of 1 +
+    `RESOLUTION` in all but `LEVEL` / 2 of the resamples. The level, which has two sides, holds for each pair; a
+    *reversal*, which takes two errors in opposite directions on nearly the same data, comes about by chance far more
+    rarely.
 
     Parameters
     ----------
     errors
         For each method, one array (n,) a seed in degrees, NaN where not scored; a method that ran once stands for all
         seeds.
-    statistic
-        Taken over the cameras of each seed; the geometric mean over the seeds is compared.
-    level
-        Two-sided.
 
     Returns
     -------
@@ -51,19 +47,18 @@ def clearly_better(
     by_seed = [table[:, np.isfinite(table).all(axis=0)] for table in by_seed]
     if min(table.shape[1] for table in by_seed) < MIN_CAMERAS:
         return set()
-    draws = _resampled(by_seed, statistic)
+    draws = _resampled(by_seed)
     share = (draws[:, None] < draws[None] - RESOLUTION).mean(axis=2)
-    return {(methods[a], methods[b]) for a, b in np.argwhere(share >= 1 - level / 2)}
+    return {(methods[a], methods[b]) for a, b in np.argwhere(share >= 1 - LEVEL / 2)}
 
 
-def _resampled(by_seed: Sequence[Floats], statistic: Statistic) -> Floats:
-    """(methods, RESAMPLES) logarithms of the statistic of errors (methods, cameras), one array a seed."""
+def _resampled(by_seed: Sequence[Floats]) -> Floats:
+    """(methods, RESAMPLES) logarithms of the median of errors (methods, cameras), one array a seed."""
     rng = np.random.default_rng(0)
-    centre = np.median if statistic == "median" else np.mean
     of_seeds = []
     for table in by_seed:
         picked = rng.integers(table.shape[1], size=(RESAMPLES, table.shape[1]))
-        of_seeds.append([np.log(np.maximum(centre(row[picked], axis=1), FLOOR_DEG)) for row in table])
+        of_seeds.append([np.log(np.maximum(np.median(row[picked], axis=1), FLOOR_DEG)) for row in table])
     chosen = rng.integers(len(by_seed), size=(len(by_seed), RESAMPLES))
     stacked = np.array(of_seeds)  # (seeds, methods, resamples)
     drawn: Floats = np.take_along_axis(stacked, chosen[:, None], axis=0).mean(axis=0)

@@ -36,7 +36,8 @@ def rank_probabilities(blocks: Blocks) -> Floats:
     from scipy.stats import rankdata
 
     rng = np.random.default_rng(0)
-    by_scene = _by_scene(blocks)
+    own, scene_of = ranks(blocks.values), np.asarray(blocks.scenes)
+    by_scene = [own[scene_of == scene] for scene in np.unique(scene_of)]
     count = len(blocks.methods)
     drawn = np.zeros((RESAMPLES, count))
     for total in drawn:
@@ -50,12 +51,6 @@ def rank_probabilities(blocks: Blocks) -> Floats:
     return np.asarray((inside / inside.sum(axis=2, keepdims=True)).mean(axis=0))
 
 
-def _by_scene(blocks: Blocks) -> list[Floats]:
-    """Ranks (problems, methods) of each scene."""
-    own, scene_of = ranks(blocks.values), np.asarray(blocks.scenes)
-    return [own[scene_of == scene] for scene in np.unique(scene_of)]
-
-
 @dataclass(frozen=True, eq=False)
 class CriticalDifference:
     """Mean ranks and which of them cannot be told apart (Demsar, JMLR 7, 2006).
@@ -66,55 +61,43 @@ class CriticalDifference:
         (k,) by mean rank, the best first.
     mean_ranks
         (k,) see `mean_ranks`.
-    problems
-        How many.
     friedman_p
         P value of Friedman's test that all methods are equally good.
     critical_difference
         Of mean ranks, by Nemenyi's test.
-    p_values
-        (k, k) of pairs of methods, Nemenyi's.
     groups
         First and last position of each longest run of methods of which no two are told apart.
     """
 
     methods: tuple[Configured, ...]
     mean_ranks: Floats
-    problems: int
     friedman_p: float
     critical_difference: float
-    p_values: Floats
     groups: tuple[tuple[int, int], ...]
 
 
-def critical_difference(blocks: Blocks, level: float = LEVEL) -> CriticalDifference:
-    """Friedman's test and, where it finds a difference, Nemenyi's of each pair.
+def critical_difference(blocks: Blocks) -> CriticalDifference:
+    """Friedman's test and, where it finds a difference, Nemenyi's of each pair; at least two methods and problems.
 
     Nemenyi's test compares mean ranks with the studentized range and so depends on which other methods take part. Mean
     ranks in which problems weigh differently vary as if they were of fewer: of ``1 / sum(weights^2)`` (Kish 1965).
-
-    Parameters
-    ----------
-    blocks
-        At least two methods and problems.
-    level
-        Of all tests.
     """
+    from scipy.stats import studentized_range
+
     mean = mean_ranks(blocks)
     order = np.argsort(mean, kind="stable")
     mean, own = mean[order], ranks(blocks.values)[:, order]
-    effective = 1 / float((blocks.weights**2).sum())
+    methods, problems = len(mean), 1 / float((blocks.weights**2).sum())
     friedman = friedman_p(own, blocks.weights)
-    p = _nemenyi(mean, effective)
-    together = np.ones_like(p, dtype=bool) if not friedman < level else ~(p < level)
+    error = float(np.sqrt(methods * (methods + 1) / (12 * problems)))
+    difference = float(studentized_range.ppf(1 - LEVEL, methods, np.inf)) * error
+    apart = np.abs(mean[:, None] - mean) > difference if friedman < LEVEL else np.zeros((methods, methods), dtype=bool)
     return CriticalDifference(
         methods=tuple(blocks.methods[k] for k in order),
         mean_ranks=mean,
-        problems=len(own),
         friedman_p=friedman,
-        critical_difference=_nemenyi_difference(len(mean), effective, level),
-        p_values=p,
-        groups=tuple(_runs(together)),
+        critical_difference=difference,
+        groups=tuple(_runs(~apart)),
     )
 
 
@@ -141,23 +124,6 @@ def friedman_p(own: Floats, weights: Floats) -> float:
     if left <= 1e-9:
         return 0.0
     return float(fdtrc(methods - 1, (methods - 1) * (problems - 1), (problems - 1) * chi / left))
-
-
-def _nemenyi_difference(methods: int, problems: float, level: float) -> float:
-    from scipy.stats import studentized_range
-
-    return float(studentized_range.ppf(1 - level, methods, np.inf)) * _error(methods, problems)
-
-
-def _nemenyi(mean: Floats, problems: float) -> Floats:
-    from scipy.stats import studentized_range
-
-    apart = np.abs(mean[:, None] - mean) / _error(len(mean), problems)
-    return np.asarray(studentized_range.sf(apart, len(mean), np.inf))
-
-
-def _error(methods: int, problems: float) -> float:
-    return float(np.sqrt(methods * (methods + 1) / (12 * problems)))
 
 
 def _runs(together: "np.ndarray[tuple[int, int], np.dtype[np.bool_]]") -> list[tuple[int, int]]:

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from bench.core.problem import Floats
-from bench.scoring.inference.difference import judged, paired, unpaired
+from bench.scoring.inference.difference import LEVEL, Difference, judged, paired, unpaired
 from bench.scoring.inference.resampling import (
     CENTRES,
     Statistic,
@@ -44,7 +44,7 @@ class Ratio:
     high: float = float("nan")
     p_value: float = float("nan")
 
-    def verdict(self, p_value: float, threshold: float, level: float = 0.05) -> Verdict:
+    def verdict(self, p_value: float, threshold: float) -> Verdict:
         """What is said of the ratio, larger being worse.
 
         Parameters
@@ -54,7 +54,7 @@ class Ratio:
         threshold
             A ratio between 1 / threshold and threshold is neither better nor worse.
         """
-        if not p_value < level or 1 / threshold <= self.value <= threshold:
+        if not p_value < LEVEL or 1 / threshold <= self.value <= threshold:
             return "cannot be told"
         return "worse" if self.value > 1 else "better"
 
@@ -88,14 +88,12 @@ def error_ratio(new: Floats, old: Floats, statistic: Statistic, *, same_cameras:
     draws = replicates(table, centre, same_cameras)
     of_cameras = camera_variance(table[0], draws[:, 0] - draws[:, 1], of_seeds, same_cameras)
     variance, freedom = combined(of_seeds, freedom, *of_cameras)
-    found = judged(mean, float(np.sqrt(variance)), freedom)
-    return _exponential(found.mean, found.low, found.high, found.p_below, found.p_above)
+    return _exponential(judged(mean, float(np.sqrt(variance)), freedom))
 
 
 def time_ratio(new_s: Floats, old_s: Floats) -> Ratio:
     """Ratio of the times of two methods from the rounds of two runs, which do not belong together one by one."""
-    found = unpaired(np.log(new_s), np.log(old_s))
-    return _exponential(found.mean, found.low, found.high, found.p_below, found.p_above)
+    return _exponential(unpaired(np.log(new_s), np.log(old_s)))
 
 
 def mean_ratio(ratios: Sequence[Ratio]) -> Ratio:
@@ -104,10 +102,9 @@ def mean_ratio(ratios: Sequence[Ratio]) -> Ratio:
     if len(known) < 2:
         return known[0] if known else Ratio(float("nan"))
     logs = np.log([ratio.value for ratio in known])
-    found = paired(logs, np.zeros(len(logs)))
-    return _exponential(found.mean, found.low, found.high, found.p_below, found.p_above)
+    return _exponential(paired(logs, np.zeros(len(logs))))
 
 
-def _exponential(mean: float, low: float, high: float, below: float, above: float) -> Ratio:
-    value, lower, upper = np.exp([mean, low, high])
-    return Ratio(float(value), float(lower), float(upper), min(2 * min(below, above), 1.0))
+def _exponential(of: Difference) -> Ratio:
+    value, low, high = np.exp([of.mean, of.low, of.high])
+    return Ratio(float(value), float(low), float(high), min(2 * min(of.p_below, of.p_above), 1.0))

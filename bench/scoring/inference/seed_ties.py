@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.core.problem import Floats
+from bench.scoring.inference.difference import LEVEL
 from bench.scoring.inference.resampling import FLOOR_DEG, SMALLEST
 from bench.scoring.inference.statistics import MIN_COVERAGE, RESOLUTION
 
@@ -20,12 +21,12 @@ MANY_SEEDS = 200
 DRAWS = 20_000
 
 
-def tied_by_seed(rows: Mapping[Key, Floats], level: float = 0.05) -> set[Key]:
+def tied_by_seed(rows: Mapping[Key, Floats]) -> set[Key]:
     """Methods that cannot be told apart from the best one, the best included.
 
     The rules are those of `bench.scoring.inference.statistics.tie_groups`, which resamples; here the differences of the
     mean logarithms are taken as normal, with the covariance that the seeds show, and the largest studentized
-    difference between any two methods is drawn from that.
+    difference between any two methods is drawn from that. Median and mean share `LEVEL` too.
 
     Parameters
     ----------
@@ -33,8 +34,6 @@ def tied_by_seed(rows: Mapping[Key, Floats], level: float = 0.05) -> set[Key]:
         For each method (s, 4): seed, median and mean error in degrees (NaN where it did not end well), and how many
         cameras were scored. The best is the best by the median; methods that scored less than 95 % of the cameras of
         the most complete one are out, and only seeds that ended well for all others count.
-    level
-        Probability of telling apart methods that are equally good, shared between median and mean.
     """
     scored = {key: of_method[:, 3].sum() for key, of_method in rows.items()}
     most = max(scored.values(), default=0)
@@ -49,11 +48,11 @@ def tied_by_seed(rows: Mapping[Key, Floats], level: float = 0.05) -> set[Key]:
     if logs.shape[2] < 2:
         return set(competing)
     best = int(np.argmin(logs[:, 0].mean(axis=1)))
-    apart = _told_apart(logs[:, 0], best, level / 2) | _told_apart(logs[:, 1], best, level / 2)
+    apart = _told_apart(logs[:, 0], best) | _told_apart(logs[:, 1], best)
     return {key for key, told in zip(competing, apart, strict=True) if not told}
 
 
-def _told_apart(logs: Floats, best: int, level: float) -> NDArray[np.bool_]:
+def _told_apart(logs: Floats, best: int) -> NDArray[np.bool_]:
     """Whether each method of logs (methods, seeds) is worse than the best by more than chance explains."""
     methods, seeds = logs.shape
     covariance = np.atleast_2d(np.cov(logs)) / seeds
@@ -65,7 +64,7 @@ def _told_apart(logs: Floats, best: int, level: float) -> NDArray[np.bool_]:
         for j in range(i):
             if error[i, j] > SMALLEST:
                 largest = np.maximum(largest, np.abs(draws[:, i] - draws[:, j]) / error[i, j])
-    critical = float(np.quantile(largest, 1 - level))
+    critical = float(np.quantile(largest, 1 - LEVEL / 2))
     behind = logs.mean(axis=1) - logs[best].mean()
     told: NDArray[np.bool_] = behind > np.maximum(critical * error[best], RESOLUTION)
     return told

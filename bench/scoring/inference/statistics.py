@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.core.problem import Floats
+from bench.scoring.inference.difference import LEVEL
 from bench.scoring.inference.resampling import (
     CENTRES,
     SMALLEST,
@@ -36,44 +37,23 @@ MIN_COVERAGE = 0.95
 RESOLUTION = 0.005  # a ratio that printed figures would hardly show is not a difference
 
 
-def confidence_interval(
-    errors: Floats, statistic: Statistic = "median", *, same_cameras: bool = True, level: float = 0.95
-) -> tuple[float, float]:
-    """Percentile bootstrap interval of one method's error on one instance.
-
-    Parameters
-    ----------
-    errors
-        (k,) or (s, k) errors of k cameras under s seeds, NaN where not scored.
-    statistic
-        Taken over the cameras of each seed, then averaged over seeds.
-    same_cameras
-        True where the seeds share one instance: a camera drawn is then drawn under every seed (the pigeonhole
-        bootstrap of Owen 2007, which errs on the wide side). False where the instance changes with the seed.
-    level
-        Coverage aimed at.
-
-    Returns
-    -------
-    tuple
-        Lower and upper end; NaN where nothing was scored.
-    """
+def confidence_interval(errors: Floats, statistic: Statistic = "median") -> tuple[float, float]:
+    """Ends of the 95 % percentile bootstrap interval of a statistic of errors (k,); NaN where nothing was scored."""
     if not np.isfinite(errors).any():
         return float("nan"), float("nan")
-    draws = replicates(np.atleast_2d(errors)[None], CENTRES[statistic], same_cameras)[:, 0]
-    low, high = np.percentile(draws, [50 * (1 - level), 50 * (1 + level)])
+    low, high = np.percentile(replicates(errors[None, None], CENTRES[statistic], True)[:, 0], [2.5, 97.5])
     return float(low), float(high)
 
 
-def seed_half_width(values: Sequence[float], level: float = 0.95) -> float:
-    """Half-width of Student's t interval of the mean over seeds; NaN for fewer than two seeds."""
+def seed_half_width(values: Sequence[float]) -> float:
+    """Half-width of Student's 95 % t interval of the mean over seeds; NaN for fewer than two seeds."""
     from scipy.special import stdtrit
 
     finite = np.asarray(values, dtype=float)
     finite = finite[np.isfinite(finite)]
     if len(finite) < 2:
         return float("nan")
-    quantile = float(stdtrit(len(finite) - 1, 0.5 + level / 2))
+    quantile = float(stdtrit(len(finite) - 1, 1 - LEVEL / 2))
     return quantile * float(finite.std(ddof=1)) / float(np.sqrt(len(finite)))
 
 
@@ -82,16 +62,17 @@ def tie_groups(
     statistics: Sequence[Statistic] = ("median", "mean"),
     *,
     same_cameras: bool = True,
-    level: float = 0.05,
 ) -> set[Key]:
     """Methods that cannot be told apart from the best one on an instance, the best included.
 
     The best is the best by the first statistic. A method leaves its group where it is worse by any of them: a
-    median alone is blind to the half of the cameras above it. The level is shared among the statistics.
+    median alone is blind to the half of the cameras above it. `LEVEL` is shared among the statistics: the probability
+    of telling apart, anywhere in the table's row, methods that are equally good. In simulations it is kept by the
+    median, while the mean of skewed errors comes to about twice the level.
 
     Methods are compared by the logarithm of a statistic, averaged over seeds, so that a hard seed weighs no
     more than an easy one. A paired bootstrap: each resample draws the same seeds and cameras for all methods.
-    A method is told apart from the best when its studentized difference exceeds the 1 - `level` quantile of
+    A method is told apart from the best when its studentized difference exceeds the 1 - `LEVEL` quantile of
     the largest studentized difference between *any* two methods in the centred bootstrap distribution
     (single-step max-t, Romano and Wolf 2005). Taking all pairs pays both for the number of comparisons and
     for having picked the best by looking. Where there are several seeds the quantile is at least
@@ -105,10 +86,8 @@ def tie_groups(
     statistics
         What is compared.
     same_cameras
-        As in `confidence_interval`.
-    level
-        Probability of telling apart, anywhere in the table's row, methods that are equally good. In
-        simulations it is kept by the median, while the mean of skewed errors comes to about twice the level.
+        True where the seeds share one instance: a camera drawn is then drawn under every seed (the pigeonhole
+        bootstrap of Owen 2007, which errs on the wide side). False where the instance changes with the seed.
 
     Returns
     -------
@@ -130,7 +109,7 @@ def tie_groups(
         return set(competing)
     centres = [log_of(CENTRES[statistic]) for statistic in statistics]
     best = int(np.argmin(np.nanmean(seed_scores(table, centres[0]), axis=1)))
-    apart = np.any([_told_apart(table, best, c, same_cameras, level / len(centres)) for c in centres], axis=0)
+    apart = np.any([_told_apart(table, best, c, same_cameras, LEVEL / len(centres)) for c in centres], axis=0)
     return {key for key, told in zip(competing, apart, strict=True) if not told}
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from bench.core import so3
 from bench.core.problem import Floats, Problem
 
-SAMPLE = 20_000
+SAMPLE = 20_000  # paths
 WRONG_DEG = 10.0
 
 
@@ -29,18 +29,12 @@ class Cycles:
     residuals: Floats
 
 
-def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
+def sample_cycles(problem: Problem) -> Cycles:
     """Triangles drawn uniformly and with replacement; the same ones for the same graph.
 
     Paths a - c - b are drawn uniformly, the middle c in proportion to the number of its pairs of neighbours; those
-    that an edge (a, b) closes are kept. Every triangle is closed from three paths, so none is preferred.
-
-    Parameters
-    ----------
-    problem
-        The measurements.
-    size
-        How many paths are drawn; those that do not close are not replaced.
+    that an edge (a, b) closes are kept, and the others not replaced. Every triangle is closed from three paths, so none
+    is preferred.
     """
     rng = np.random.default_rng(0)
     pair = problem.edges[:, 0].astype(np.int64) * problem.n + problem.edges[:, 1]
@@ -52,9 +46,9 @@ def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
     pairs = degree * (degree - 1)
     if not pairs.any():
         return Cycles(np.empty((0, 3), dtype=np.intp), np.empty(0))
-    middle = rng.choice(problem.n, size, p=pairs / pairs.sum()).astype(np.intp)
-    first = (rng.random(size) * degree[middle]).astype(np.int64)
-    second = (first + 1 + (rng.random(size) * (degree[middle] - 1)).astype(np.int64)) % degree[middle]
+    middle = rng.choice(problem.n, SAMPLE, p=pairs / pairs.sum()).astype(np.intp)
+    first = (rng.random(SAMPLE) * degree[middle]).astype(np.int64)
+    second = (first + 1 + (rng.random(SAMPLE) * (degree[middle] - 1)).astype(np.int64)) % degree[middle]
     one, other = graph.indptr[middle] + first, graph.indptr[middle] + second
     a, b = graph.indices[one].astype(np.intp), graph.indices[other].astype(np.intp)
     closing = np.asarray(graph[a, b]).ravel().astype(np.intp) - 1

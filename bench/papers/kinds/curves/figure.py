@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from bench.papers.kinds.curves.grid import notes
 from bench.papers.kinds.curves.plot import CurvePlot, Curves, Point
 from bench.reporting.figures.looks import COLORS, LINES, Look
 from bench.reporting.figures.style import describe, log_axis, panels, styled
@@ -38,7 +37,7 @@ def draw(found: Curves) -> Figure:
         for ax in axes:
             log_axis(ax.yaxis, low, high, TICKS)
         caption = f"{plot.dataset}, {found.computed.alignment} alignment."
-        describe(figure, plot.title, " ".join([caption, *notes(found)]))
+        describe(figure, plot.title, " ".join([caption, *found.notes()]))
     return figure
 
 

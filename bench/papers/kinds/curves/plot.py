@@ -1,14 +1,15 @@
 """What a layout says of a figure of curves, and its points."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from bench.core.problem import Floats
 from bench.papers.computed import Computed, extended, label, one
-from bench.papers.item import Comparison
+from bench.papers.item import Comparison, MeasuredItem
 from bench.papers.published import Sources
 from bench.plugins.catalog import catalog
 from bench.scoring.inference.statistics import seed_half_width
@@ -54,38 +55,28 @@ class Curve:
     reference: bool = False
 
 
-@dataclass(frozen=True)
-class CurvePlot:
+@dataclass(frozen=True, kw_only=True)
+class CurvePlot(MeasuredItem):
     """Layout of such a figure.
 
     Parameters
     ----------
-    title
-        What the figure shows.
     dataset
         Selection of what stays the same.
     panel, axis
         What differs between panels, and along the horizontal axis.
     curves
         What is drawn.
-    statistic, alignment
-        What is drawn of the errors, and the rule that removes the gauge.
-    seeds, timeout_s, memory_gib
-        As in a suite.
+    statistic
+        What is drawn of the errors.
     """
 
-    title: str
     dataset: str
     panel: Axis
     axis: Axis
     curves: tuple[Curve, ...]
     statistic: Literal["mean_deg", "median_deg", "rms_deg"]
-    alignment: str
     seeds: int = 10
-    timeout_s: float = 600.0
-    memory_gib: float = 8.0
-
-    needs: ClassVar[Collection[str]] = ()
 
     def suites(self, name: str) -> tuple[Suite, ...]:
         """What has to run: a suite for each variant of the dataset."""
@@ -93,10 +84,7 @@ class CurvePlot:
         for curve in (curve for curve in self.curves if curve.method):
             datasets = tuple(text for _, _, text in self._problems(curve))
             methods.setdefault(datasets, []).append(curve.method)
-        return tuple(
-            Suite(name, self.title, datasets, tuple(texts), self.seeds, self.timeout_s, self.memory_gib)
-            for datasets, texts in methods.items()
-        )
+        return tuple(self.suite(name, datasets, texts) for datasets, texts in methods.items())
 
     def compare(self, sources: Sources, computed: Computed) -> "Curves":
         """The points of every curve; nothing is published in numbers."""
@@ -173,9 +161,48 @@ class Curves(Comparison):
 
     def grid(self) -> "Grid":
         """A row for each panel and place on the axis, a column for each curve."""
-        from bench.papers.kinds.curves.grid import point_grid
+        from bench.reporting.tables.grid import Cell, Grid
+        from bench.reporting.tables.printed import degrees
 
-        return point_grid(self)
+        def text(point: Point) -> str:
+            spread = f" ±{degrees(point.half_width_deg)}" if math.isfinite(point.half_width_deg) else ""
+            partly = f" ({point.ok}/{point.seeds})" if point.ok < point.seeds else ""
+            return f"{degrees(point.error_deg)}{spread}{partly}"
+
+        plot = self.plot
+        places: dict[tuple[float, float], dict[str, Point]] = {}
+        for point in self.rows:
+            places.setdefault((point.panel, point.x), {})[point.curve] = point
+        curves = [curve.label for curve in plot.curves]
+        return Grid(
+            caption=f"{plot.title}; degrees, {self.computed.alignment} alignment, {plot.dataset}",
+            facts=(plot.panel.parameter, plot.axis.parameter),
+            methods=tuple((name, "") for name in curves),
+            rows=tuple(
+                (tuple(f"{value:g}" for value in place), tuple(Cell(text(by_curve[name])) for name in curves))
+                for place, by_curve in places.items()
+            ),
+            notes=tuple(self.notes()),
+        )
+
+    def notes(self) -> Iterator[str]:
+        """What the figures are means of, and what is noted of problems and methods."""
+        seeds = max(point.seeds for point in self.rows)
+        yield f"Means over {seeds} seeds with their 95 % t intervals." if seeds > 1 else "One seed."
+        names = {job.dataset: job.instance for job in self.computed.jobs}
+        said: dict[str, list[str]] = {}
+        for curve in dict.fromkeys(point.curve for point in self.rows):
+            own = [point for point in self.rows if point.curve == curve]
+            remarks = [note for point in own for note in self.computed.notes.get(names.get(point.dataset, ""), ())]
+            if (share := min(point.scored_percent for point in own)) < 100:
+                remarks.append(
+                    f"solved and scored on the largest component of each graph, at least {share:.1f} % of the cameras"
+                )
+            for note in dict.fromkeys(remarks):
+                said.setdefault(note, []).append(curve)
+        yield from (f"{' and '.join(curves)}: {note}." for note, curves in said.items())
+        if any(point.ok < point.seeds for point in self.rows):
+            yield "(k/s): only k of s seeds ended well."
 
     def figure(self) -> "Figure":
         """Curves with their bands; the vertical axis is logarithmic."""

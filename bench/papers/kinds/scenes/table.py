@@ -1,15 +1,16 @@
 """What a layout says of a table of scenes, and its cells: measured, published, difference."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from bench.core import outcome
 from bench.core.errors import InputError, suggestion
 from bench.papers.computed import Computed, Score, extended, label
-from bench.papers.item import Comparison
+from bench.papers.item import Comparison, MeasuredItem
 from bench.papers.published import FACTS, SCENE, Sources, methods_of, read_published
 from bench.suite.experiment import Suite
 
@@ -24,23 +25,19 @@ NOT_ON_DISK = "not on disk"
 NO_TRUTH = "no ground truth"
 PUBLISHED_ONLY = "published only"
 
-Statistic = Literal["mean_deg", "median_deg"]
-
 
 @dataclass(frozen=True)
-class SceneTable:
+class SceneTable(MeasuredItem):
     """Layout of such a table.
 
     Parameters
     ----------
-    title
-        What the table is, in the paper's words.
     published
         File of its numbers; see `bench.papers.published`.
     dataset, scene_parameter
         Selection of the dataset, protocol included, and its parameter that takes a scene.
-    statistic, alignment
-        What is printed of the errors, and the rule that removes the gauge.
+    statistic
+        What is printed of the errors.
     highlight_reference, highlight_deg
         Numbers at most that far from those of the reference column are highlighted.
     measured
@@ -50,32 +47,22 @@ class SceneTable:
         The paper's name of each scene, and ours.
     variants
         For each published column further selections that could stand for it; `bench.papers.explain` tries them.
-    seeds, timeout_s, memory_gib
-        As in a suite.
     """
 
-    title: str
     published: str
     dataset: str
     scene_parameter: str
-    statistic: Statistic
-    alignment: str
+    statistic: Literal["mean_deg", "median_deg"]
     highlight_reference: str
     highlight_deg: float
     measured: Mapping[str, tuple[str, ...]]
     scenes: Mapping[str, str]
     variants: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    seeds: int = 1
-    timeout_s: float = 600.0
-    memory_gib: float = 8.0
-
-    needs: ClassVar[Collection[str]] = ()
 
     def suites(self, name: str) -> tuple[Suite, ...]:
         """What has to run."""
-        datasets = tuple(extended(self.dataset, {self.scene_parameter: scene}) for scene in self.scenes.values())
-        methods = tuple(dict.fromkeys(text for texts in self.measured.values() for text in texts))
-        return (Suite(name, self.title, datasets, methods, self.seeds, self.timeout_s, self.memory_gib),)
+        datasets = (extended(self.dataset, {self.scene_parameter: scene}) for scene in self.scenes.values())
+        return (self.suite(name, datasets, dict.fromkeys(itertools.chain(*self.measured.values()))),)
 
     def compare(self, sources: Sources, computed: Computed) -> "Scenes":
         """Measured, published and difference of each cell.

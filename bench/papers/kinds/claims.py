@@ -1,6 +1,8 @@
-"""What a layout says of a paper's sentences, and how each is tested."""
+"""Sentences of a paper as comparisons that can be tested, for several forms of its method."""
 
 import itertools
+import math
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
@@ -9,7 +11,7 @@ import numpy as np
 
 from bench.core.errors import InputError, shown, suggestion
 from bench.papers.computed import Computed, extended, label
-from bench.papers.item import Comparison
+from bench.papers.item import Comparison, MeasuredItem
 from bench.papers.published import SCENE, Sources, methods_of, read_published
 from bench.plugins import selection
 from bench.scoring.inference.difference import LEVEL, holm, paired, unpaired
@@ -80,34 +82,25 @@ class Statement:
     seeds: int = 0
 
 
-@dataclass(frozen=True)
-class Claims:
+@dataclass(frozen=True, kw_only=True)
+class Claims(MeasuredItem):
     """Layout of such a table.
 
     Parameters
     ----------
-    title
-        What it is.
     forms
         Name of each form of the paper's method, and its selection.
     statements
         The sentences.
-    alignment
-        The rule that removes the gauge.
     published
         File of the published numbers; the paper's name of a scene is ours with spaces.
-    seeds, timeout_s, memory_gib
-        As in a suite.
     """
 
-    title: str
     forms: Mapping[str, str]
     statements: tuple[Statement, ...]
-    alignment: str
     published: str
     seeds: int = 10
     timeout_s: float = 3600.0
-    memory_gib: float = 8.0
 
     needs: ClassVar[Collection[str]] = (ORACLE,)
 
@@ -124,10 +117,7 @@ class Claims:
             for side in (side for side in (case.left, case.right) if not side.published):
                 place = extended(case.dataset, side.dataset), case.statement.seeds or self.seeds
                 methods.setdefault(place, {})[self._method(case.form, side)] = None
-        return tuple(
-            Suite(name, self.title, (dataset,), tuple(chosen), seeds, self.timeout_s, self.memory_gib)
-            for (dataset, seeds), chosen in methods.items()
-        )
+        return tuple(self.suite(name, [dataset], chosen, seeds) for (dataset, seeds), chosen in methods.items())
 
     def compare(self, sources: Sources, computed: Computed) -> "Verdicts":
         """Test every comparison under each rule that picks the iterate.
@@ -249,10 +239,55 @@ class Verdicts(Comparison):
     computed: Computed
 
     def grid(self) -> "Grid":
-        """A row for each comparison: both sides and the verdict under each rule."""
-        from bench.papers.kinds.claims.grid import claims_grid
+        """A row for each comparison: both sides and the verdict, under the honest rule and under the oracle."""
+        from bench.reporting.tables.grid import ABSENT, Cell, Grid
+        from bench.reporting.tables.printed import degrees
 
-        return claims_grid(self)
+        def cells(row: Verdict) -> Iterator[Cell]:
+            for side in (row.left_deg, row.right_deg):
+                yield Cell(degrees(side) if math.isfinite(side) else ABSENT)
+            half = (row.high_deg - row.low_deg) / 2
+            yield Cell(f"{row.difference_deg:+.2f} ±{half:.2f}" if math.isfinite(half) else ABSENT)
+            yield Cell(row.verdict, row.verdict == HOLDS)
+
+        comparisons: dict[tuple[str, ...], dict[str, Verdict]] = {}
+        for row in self.rows:
+            key = row.sentence, row.form, row.dataset, row.left, row.right
+            comparisons.setdefault(key, {})[row.rule] = row
+        rows = []
+        said = ""
+        for (sentence, form, dataset, left, right), by_rule in comparisons.items():
+            where = dataset.split("[", 1)[1].rstrip("]") if "[" in dataset else dataset
+            facts = ("" if sentence == said else sentence, form, where, f"{left} < {right}")
+            rows.append((facts, tuple(cell for rule in RULES for cell in cells(by_rule[rule]))))
+            said = sentence
+        return Grid(
+            caption=f"{self.table.title}; degrees, {self.computed.alignment} alignment",
+            facts=("The paper says", "form", "on", "tested"),
+            methods=tuple((what, rule) for rule in RULES for what in ("left", "right", "difference", "verdict")),
+            rows=tuple(rows),
+            notes=tuple(self._notes()),
+        )
+
+    def _notes(self) -> Iterator[str]:
+        yield (
+            "Left below right, by Student's t on differences paired by problem, or Welch's where the problems differ; "
+            f"p < 0.05 after Holm's correction for all comparisons of a rule. {OPEN}: neither this nor its opposite "
+            "shown."
+        )
+        for sentence, margin in {s.sentence: s.margin_deg for s in self.table.statements if s.margin_deg}.items():
+            yield f"“{sentence}”: left below right plus {margin:g} degrees."
+        yield (
+            f"{HONEST}: what the method returns, which has seen no ground truth. {ORACLE}: the checkpoint that ground "
+            "truth likes best, which is how the published figures were picked."
+        )
+        counts: dict[tuple[str, str, str], Counter[str]] = {}
+        for row in sorted(self.rows, key=lambda row: RULES.index(row.rule)):
+            counts.setdefault((row.rule, row.sentence, row.form), Counter())[row.verdict] += 1
+        for (rule, sentence, form), verdicts in counts.items():
+            told = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common())
+            yield f"{rule}, {form}: “{sentence}”: {told} (of {verdicts.total()})."
+        yield from self.computed.absences()
 
 
 def _judged(rows: Sequence[Verdict]) -> Iterator[Verdict]:
@@ -266,3 +301,6 @@ def _judged(rows: Sequence[Verdict]) -> Iterator[Verdict]:
         holds, fails = corrected[k]
         verdict = HOLDS if holds < LEVEL else FAILS if fails < LEVEL else OPEN
         yield replace(row, p_holds=holds, p_fails=fails, verdict=verdict)
+
+
+ITEM = Claims

@@ -1,0 +1,39 @@
+"""Numbers as tables print them; what is not known is a dash."""
+
+import math
+
+from bench.reporting.tables.rows import Entry
+
+
+def speedup(entry: Entry) -> str:
+    """Ratio to the baseline as a table prints it, with its range."""
+    ratio, low, high = (entry.value(f"speedup{end}").mean for end in ("", "_low", "_high"))
+    return f"{ratio:.3g} ({low:.3g} to {high:.3g})" if math.isfinite(ratio) else "–"
+
+
+def degrees(value: float) -> str:
+    """An angle as a table prints it."""
+    if not math.isfinite(value):
+        return "–"
+    return "0" if value == 0 else f"{value:.2f}" if value >= 0.005 else f"{value:.0e}"
+
+
+def exact_seconds(value: float) -> str:
+    """A time of a timing run as a table prints it, three digits however short it is."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.{max(2 - math.floor(math.log10(value)), 0)}f}" if value > 0 else "0"
+
+
+def area(value: float) -> str:
+    """An area under a curve as a table prints it; what is below 1 never shows as 1."""
+    if not math.isfinite(value):
+        return "–"
+    return "1" if value == 1 else f"{min(value, 0.9999):.4f}"
+
+
+def seconds(value: float) -> str:
+    """A time as a table prints it, three digits."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.{3 if value < 1 else 2 if value < 10 else 1 if value < 100 else 0}f}"
