@@ -1,11 +1,14 @@
 """``bench check``: is a plug-in fit to be benchmarked?"""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bench.cli.new import Kind
 from bench.cli.options import PluginOption
+
+if TYPE_CHECKING:
+    from bench.plugins.catalog import Catalog
 
 
 def check(
@@ -14,14 +17,27 @@ def check(
     plugin: PluginOption = None,
 ) -> None:
     """Run the conformance checks on a method; exit code 1 when one fails."""
-    from bench.plugins.catalog import catalog
+    from bench.plugins.catalog import catalog, plugin_path
     from bench.running.conformance import check_method
 
-    chosen = catalog(kind.value, plugin or []).one(selection)
+    known = catalog(kind.value, plugin or [])
+    _declares_some(known, [plugin_path(path) for path in plugin or []])
+    chosen = known.one(selection)
     failed = 0
     for finding in check_method(*chosen):
         failed += finding.result == "failed"
         detail = f"   {finding.detail}" if finding.detail else ""
         typer.echo(f"{finding.result:<8} {finding.check}{detail}")
-    typer.echo(f"{selection}: " + (f"{failed} checks failed" if failed else "fit to be benchmarked"))
+    typer.echo(f"{selection}: " + (f"{failed} check{'s' * (failed > 1)} failed" if failed else "fit to be benchmarked"))
     raise typer.Exit(1 if failed else 0)
+
+
+def _declares_some(known: "Catalog[Any]", origins: list[str]) -> None:
+    """Refuse a file in which nothing is declared, as where the decorator was forgotten."""
+    from bench.core.errors import InputError
+
+    silent = set(origins) - {info.origin for info in known} - set(known.broken)
+    for origin in sorted(silent):
+        raise InputError(
+            f"{origin} declares no {known.kind}: put @{known.kind}('name', title='Title') above a frozen dataclass"
+        )

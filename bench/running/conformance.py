@@ -3,13 +3,15 @@
 Each check solves small problems whose answer is known, in the supervised child that a run would use.
 """
 
+import re
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from bench.core import outcome, so3
+from bench.core import so3
 from bench.core.errors import InputError
 from bench.core.limits import Limits
 from bench.core.problem import Floats, Problem, oriented
@@ -26,6 +28,10 @@ class Failed(Exception):  # noqa: N818 - the finding of a check
     """A check did not hold; the message says how."""
 
 
+class BrokenError(Failed):
+    """The method gave no answer; the message says how it ended, and where in its own code."""
+
+
 class NotApplicable(Exception):  # noqa: N818 - the finding of a check
     """A check could not be made; the message says why."""
 
@@ -40,7 +46,18 @@ class Finding:
 
 
 def check_method(info: MethodInfo, parameters: dict[str, Any]) -> Iterator[Finding]:
-    """Run every check on a configured method, yielding each finding as it is made."""
+    """Run every check on a configured method, yielding each finding as it is made.
+
+    A fault is told once: a method without an answer to an ordinary problem is not asked further.
+
+    Raises
+    ------
+    InputError
+        Where packages that it requires are not installed.
+    """
+    if info.not_installed(parameters):
+        raise InputError(f"method '{info.name}' cannot be checked before: {info.install_hint(parameters)}")
+    told: dict[str, str] = {}
     with SingleSolver(info, parameters, LIMITS) as solver:
         kit = _Kit(info, solver)
         for check in CHECKS:
@@ -48,7 +65,11 @@ def check_method(info: MethodInfo, parameters: dict[str, Any]) -> Iterator[Findi
             try:
                 check(kit)
             except Failed as finding:
-                yield Finding(name, "failed", str(finding))
+                detail, first = str(finding), told.setdefault(str(finding), name)
+                yield Finding(name, "failed", detail if first == name else f"as in: {first}")
+                if check is _exact_recovery and isinstance(finding, BrokenError):
+                    yield Finding("every other check", "skipped", "it has no answer to an ordinary problem")
+                    return
             except NotApplicable as finding:
                 yield Finding(name, "skipped", str(finding))
             else:
@@ -86,10 +107,8 @@ class _Kit:
             return self._rotations(solver.solve(problem, seed))
 
     def _rotations(self, answer: Answer) -> Floats:
-        if answer.outcome.kind == outcome.NOT_INSTALLED:
-            raise NotApplicable(answer.outcome.text)
         if answer.estimate is None:
-            raise Failed(f"{answer.outcome.text} {answer.log.strip()[-300:]}".strip())
+            raise BrokenError(_ending(answer, self.info))
         return answer.estimate.rotations
 
     def recovers(self, problem: Problem, truth: Floats) -> None:
@@ -190,11 +209,11 @@ def _deterministic_as_declared(kit: _Kit) -> None:
 
 
 CHECKS: tuple[Callable[[_Kit], None], ...] = (
+    _exact_recovery,
     _two_cameras,
     _triangle,
     _ring,
     _tree,
-    _exact_recovery,
     _disconnected_graph,
     _relabelled_cameras,
     _permuted_edges,
@@ -204,6 +223,15 @@ CHECKS: tuple[Callable[[_Kit], None], ...] = (
     _deterministic_as_declared,
     _reference,
 )
+
+
+def _ending(answer: Answer, info: MethodInfo) -> str:
+    """How a method ended without an answer: the line of its own file where it raised, else what it printed last."""
+    file = str(sys.modules[info.cls.__module__].__file__)
+    lines = re.findall(rf'File "{re.escape(file)}", line (\d+)', answer.log)
+    if lines:
+        return f"{file}:{lines[-1]}: {answer.outcome.text}"
+    return f"{answer.outcome.text} {answer.log.strip()[-300:]}".strip()
 
 
 def _compare(found: Floats, wanted: Floats, tolerance_deg: float, what: str) -> None:

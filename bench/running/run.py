@@ -207,7 +207,7 @@ def _resolved(
     own = [str(Path(path).resolve()) for path in options.plugins]
     for origin in own:
         if origin in known_methods.broken:
-            raise InputError(f"--plugin {origin} is broken: {known_methods.broken[origin]}")
+            raise InputError(f"a plug-in is broken: {known_methods.broken[origin]}")
     plugged_in = [info.name for info in known_methods if info.origin in own]
     changes: dict[str, Any] = {
         "methods": tuple(methods) or (*suite.methods, *plugged_in),
