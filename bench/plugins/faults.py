@@ -14,13 +14,14 @@ def located(error: BaseException, origin: str) -> str:
     origin
         Path or dotted name of the plug-in's module, the place where no better one is known.
     """
-    place, told = _innermost(error, Path(origin).parent) or origin, error
+    place, told = innermost(error, Path(origin).parent) or origin, error
     if isinstance(error, SyntaxError) and error.filename and error.lineno:
         place, told = f"{error.filename}:{error.lineno}", type(error)(error.msg)
     return f"{place}: {described(told)}{_remedy(error)}"
 
 
-def _innermost(error: BaseException, folder: Path) -> str:
+def innermost(error: BaseException, folder: Path) -> str:
+    """The last place in the modules of a folder that an exception came through; empty where there is none."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if Path(frame.filename).parent == folder]
     return f"{own[-1].filename}:{own[-1].lineno}" if own else ""

@@ -5,9 +5,9 @@ Each check solves small problems whose answer is known, in the supervised child 
 
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from bench.core.problem import Floats, Problem, oriented
 from bench.execution.single import Answer, SingleSolver
 from bench.plugins.declare import MethodInfo
 from bench.plugins.references import cite_keys, references
+
+Kit = TypeVar("Kit")
 
 LIMITS = Limits(seconds=60, memory_gib=4)
 CAMERAS = 12
@@ -57,23 +59,29 @@ def check_method(info: MethodInfo, parameters: dict[str, Any]) -> Iterator[Findi
     """
     if info.not_installed(parameters):
         raise InputError(f"method '{info.name}' cannot be checked before: {info.install_hint(parameters)}")
-    told: dict[str, str] = {}
     with SingleSolver(info, parameters, LIMITS) as solver:
         kit = _Kit(info, solver)
-        for check in CHECKS:
-            name = check.__name__.strip("_").replace("_", " ")
-            try:
-                check(kit)
-            except Failed as finding:
-                detail, first = str(finding), told.setdefault(str(finding), name)
-                yield Finding(name, "failed", detail if first == name else f"as in: {first}")
-                if check is _exact_recovery and isinstance(finding, BrokenError):
-                    yield Finding("every other check", "skipped", "it has no answer to an ordinary problem")
-                    return
-            except NotApplicable as finding:
-                yield Finding(name, "skipped", str(finding))
-            else:
-                yield Finding(name, "passed")
+        yield from findings(CHECKS, kit)
+
+
+def findings(checks: Iterable[Callable[[Kit], None]], kit: Kit) -> Iterator[Finding]:
+    """Make checks one after another; the same fault is told once, and `BrokenError` in the first ends them."""
+    told: dict[str, str] = {}
+    for check in checks:
+        name = check.__name__.strip("_").replace("_", " ")
+        try:
+            check(kit)
+        except Failed as finding:
+            yield Finding(name, "failed", f"as in: {told[str(finding)]}" if str(finding) in told else str(finding))
+            if isinstance(finding, BrokenError) and not told:
+                yield Finding("every other check", "skipped", "not made before this one holds")
+                return
+            told.setdefault(str(finding), name)
+        except NotApplicable as finding:
+            yield Finding(name, "skipped", str(finding))
+        else:
+            yield Finding(name, "passed")
+            told.setdefault("", name)
 
 
 @dataclass(frozen=True)
