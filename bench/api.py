@@ -1,5 +1,6 @@
 """The door for Python users: what the command line does, with objects in place of files."""
 
+import warnings
 from collections.abc import Collection, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -42,7 +43,8 @@ def run(
 
     Returns
     -------
-    One row for each instance, method, parameters and seed, whatever became of it.
+    One row for each instance, method, parameters and seed, whatever became of it. An instance that cannot be loaded
+    has none, and is told in a warning.
 
     Raises
     ------
@@ -62,6 +64,8 @@ def run(
     paths = {name: Path(options[name]) for name in ("out", "data_dir") if options.get(name) is not None}
     planned = Run(suite, methods, datasets, Options(**options | paths))
     planned.prepare()
+    for sentence in planned.unloaded:
+        warnings.warn(sentence, stacklevel=2)
     for _ in planned.execute():
         pass
     return score(planned.store, align, planned.options.protocol).frame

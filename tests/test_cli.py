@@ -239,7 +239,7 @@ def test_misuse_from_python_is_one_sentence(tmp_path: Path, given: dict[str, obj
 def test_a_broken_plugin_is_listed_as_broken(tmp_path: Path) -> None:
     path = tmp_path / "broken.py"
     path.write_text("import no_such_package\n")
-    assert f"broken: {path}: ModuleNotFoundError" in bench("list", "methods", "--plugin", path).stdout
+    assert f"broken: {path}:1: ModuleNotFoundError" in bench("list", "methods", "--plugin", path).stdout
 
 
 def test_check_fails_with_exit_code_1(faulty_plugin: Path) -> None:

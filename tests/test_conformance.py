@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import pytest
+from commands import bench
 
+from bench.core.errors import InputError
 from bench.methods._lib.starts import SEEDED
 from bench.plugins.catalog import catalog
-from bench.running.conformance import CHECKS, check_method
+from bench.running.conformance import CHECKS, Finding, check_method
 
 METHODS = catalog("method")
 CONFIGURATIONS = [
@@ -100,3 +102,49 @@ def test_a_crash_is_a_finding(faulty_plugin: Path) -> None:
     finding = next(iter(check_method(info, {"fault": "segfault"})))
     assert finding.result == "failed"
     assert "SIGSEGV" in finding.detail
+
+
+BREAKS = """
+from dataclasses import dataclass
+import numpy as np
+from bench import method
+
+@method("breaks", title="Breaks", requires=REQUIRES)
+@dataclass(frozen=True)
+class Breaks:
+    def solve(self, problem, rng):
+        return so3.project(problem)
+"""
+
+
+def broken(folder: Path, requires: str = "()") -> list[Finding]:
+    path = folder / "breaks.py"
+    path.write_text(BREAKS.replace("REQUIRES", requires))
+    return list(check_method(catalog("method", [path])["breaks"], {}))
+
+
+def test_a_method_that_always_fails_says_so_once_with_file_and_line(tmp_path: Path) -> None:
+    first, rest = broken(tmp_path)
+    assert first.result == "failed"
+    assert first.detail == f"{tmp_path}/breaks.py:10: error(NameError: name 'so3' is not defined)"
+    assert rest.result == "skipped"
+
+
+def test_what_is_not_installed_is_refused_once(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="python -m pip install not_there"):
+        broken(tmp_path, "('not_there',)")
+
+
+def test_a_fault_that_recurs_is_referred_to(faulty_plugin: Path) -> None:
+    info = catalog("method", [faulty_plugin])["faulty"]
+    details = [f.detail for f in check_method(info, {"fault": "some-nan"}) if f.result == "failed"]
+    assert details[0] == "1 cameras of a connected graph were not solved"
+    assert details[1] == "as in: exact recovery"
+    assert len(details) == len(set(details)) + details.count(details[1]) - 1
+
+
+def test_a_file_that_declares_nothing_says_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text("class Mine:\n    def solve(self, problem, rng): ...\n")
+    done = bench("check", "method", "mine", "--plugin", path, code=2)
+    assert f"{path} declares no method: put @method(" in done.stderr

@@ -351,6 +351,6 @@ def test_plug_ins_that_declare_nonsense_are_listed_as_broken(tmp_path: Path) -> 
     paths = sorted(tmp_path.glob("*.py"))
     broken = catalog("method", paths).broken
     assert sorted(broken) == list(map(str, paths))
-    assert broken[str(tmp_path / "leaves.py")] == "SystemExit: goodbye"
+    assert broken[str(tmp_path / "leaves.py")] == f"{tmp_path}/leaves.py:2: SystemExit: goodbye"
     assert "top-level packages" in broken[str(tmp_path / "dotted.py")]
     assert all("\n" not in why for why in broken.values())

@@ -83,6 +83,7 @@ def test_missing_packages_are_seen_without_importing(tmp_path: Path) -> None:
     [
         ("class M:\n    def solve(self, problem, rng): ...", "put @dataclass"),
         ("@dataclass(frozen=True)\nclass M:\n    x: int = 1", "no method called solve"),
+        ("@dataclass\nclass M:\n    x: int = 1\n    def solve(self, problem, rng): ...", "put @dataclass(frozen=True)"),
         (
             "@dataclass(frozen=True)\nclass M:\n    x: int\n    def solve(self, problem, rng): ...",
             "'x' needs a default",
@@ -92,7 +93,36 @@ def test_missing_packages_are_seen_without_importing(tmp_path: Path) -> None:
 def test_a_wrong_declaration_says_what_to_do(tmp_path: Path, declaration: str, reason: str) -> None:
     path = tmp_path / "wrong.py"
     path.write_text(f"{HEADER}\n@method('wrong', title='T')\n{declaration}\n")
-    assert reason in catalog("method", [path]).broken[str(path)]
+    why = catalog("method", [path]).broken[str(path)]
+    assert why.startswith(f"{path}:5: TypeError: ")
+    assert reason in why
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("def f(", "SyntaxError: '(' was never closed"),
+        ("import nowhere_at_all.deep", "requires=('nowhere_at_all',)"),
+        ("x = np.eye(3)", "NameError: name 'np' is not defined; import or define it"),
+    ],
+)
+def test_a_broken_plugin_is_named_with_its_line_whatever_it_is_asked_for(
+    tmp_path: Path, line: str, reason: str
+) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(f"{HEADER}\n{line}\n")
+    with pytest.raises(InputError) as refused:
+        catalog("method", [path])["another-name"]
+    assert f"a plug-in is broken: {path}:5: " in str(refused.value)
+    assert reason in str(refused.value)
+
+
+def test_the_line_of_a_module_beside_the_plugin_is_named(tmp_path: Path) -> None:
+    (tmp_path / "beside_the_plugin.py").write_text("\n\n1 / 0\n")
+    path = tmp_path / "mine.py"
+    path.write_text("import sys\nsys.path.insert(0, __file__[:-8])\nimport beside_the_plugin\n")
+    why = catalog("method", [path]).broken[str(path)]
+    assert why == f"{tmp_path}/beside_the_plugin.py:3: ZeroDivisionError: division by zero"
 
 
 def test_a_grid_gives_each_configuration_once(tmp_path: Path) -> None:

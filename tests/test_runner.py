@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.api import run as bench_run
 from bench.core.errors import InputError
 from bench.plugins.catalog import catalog
 from bench.running.run import Options, Run
@@ -203,3 +204,64 @@ def test_bad_options_are_one_sentence(
 def test_opening_a_folder_that_is_no_run(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is not the folder of a run"):
         Store.open(tmp_path)
+
+
+SCENES = """
+from dataclasses import dataclass
+import numpy as np
+from bench import Instance, Problem, Source, dataset
+
+@dataclass(frozen=True)
+class Load:
+    name: str
+    unreadable: str
+
+    def __call__(self):
+        if self.name in self.unreadable:
+            raise KeyError(self.name)
+        rotations = np.tile(np.eye(3), (3, 1, 1))
+        edges = np.array([[0, 1], [0, 2], [1, 2]])
+        return Instance(Problem(3, edges, rotations), rotations, self.name, revision=self.name)
+
+@dataset("scenes", title="Scenes")
+@dataclass(frozen=True)
+class Scenes:
+    unreadable: str = "b"
+
+    def sources(self, data_dir, seed):
+        for name in "abc":
+            yield Source(name, name, Load(name, self.unreadable))
+"""
+
+
+def test_an_unreadable_scene_costs_its_own_rows(faulty_plugin: Path, tmp_path: Path) -> None:
+    (tmp_path / "scenes.py").write_text(SCENES)
+    plugins = (faulty_plugin, tmp_path / "scenes.py")
+    run = planned(faulty_plugin, tmp_path / "run", ["faulty"], ["scenes"], plugins=plugins)
+    told: list[str] = []
+    run.prepare(told.append)
+    assert [record.outcome.text for _, record in run.execute()] == ["ok", "ok"]
+    why = f"scenes b cannot be loaded and is left out: dataset 'scenes': {tmp_path}/scenes.py:13: KeyError: 'b'"
+    assert why in told
+    results = score(run.store)
+    assert list(results.frame["instance"]) == ["a", "c"]
+    assert why in results.footnotes
+    assert why in run.experiment.missing
+
+
+def test_a_run_of_nothing_but_unreadable_scenes_is_refused(faulty_plugin: Path, tmp_path: Path) -> None:
+    (tmp_path / "scenes.py").write_text(SCENES)
+    plugins = (faulty_plugin, tmp_path / "scenes.py")
+    run = planned(faulty_plugin, tmp_path / "run", ["faulty"], ["scenes[unreadable=abc]"], plugins=plugins)
+    with pytest.raises(InputError, match=r"scenes.py:13: KeyError: 'a'; .*KeyError: 'c'"):
+        run.prepare()
+    assert not list((tmp_path / "run").rglob("plans/*"))
+
+
+def test_python_is_warned_of_an_unreadable_scene(faulty_plugin: Path, tmp_path: Path) -> None:
+    (tmp_path / "scenes.py").write_text(SCENES)
+    with pytest.warns(UserWarning, match="scenes b cannot be loaded"):
+        frame = bench_run(
+            methods=["faulty"], datasets=["scenes"], out=tmp_path, plugins=(faulty_plugin, tmp_path / "scenes.py")
+        )
+    assert list(frame["instance"]) == ["a", "c"]

@@ -109,13 +109,14 @@ def verify(name: Annotated[str, typer.Argument(metavar="DATASET")], data_dir: Da
 def _sources(name: str | None, data_dir: Path | None, protocol: str | None) -> "Iterator[tuple[str, Source | Missing]]":
     """Every instance of a selection, or of all datasets, with the name of its dataset."""
     from bench.plugins.catalog import catalog
+    from bench.plugins.sources import sources_of
 
     known = catalog("dataset")
     every = (info.name for info in known if not info.facts["takes_paths"])
     for info, parameters in known.select([known.with_paths(name)] if name else every):
         if protocol is not None and "protocol" in info.defaults():
             parameters |= {"protocol": protocol}
-        for source in info.configure(parameters).sources(data_dir, 0):
+        for source in sources_of(info, info.configure(parameters), data_dir, 0):
             yield info.name, source
 
 

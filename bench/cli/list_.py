@@ -54,5 +54,5 @@ def _list_plugins(kind: str, plugins: list[Path]) -> None:
         if info.facts.get("max_cameras"):
             details.append(f"up to {info.facts['max_cameras']} cameras")
         typer.echo(f"{'':<15}   {'; '.join(details)}")
-    for origin, why in found.broken.items():
-        typer.echo(f"broken: {origin}: {why}")
+    for why in found.broken.values():
+        typer.echo(f"broken: {why}")

@@ -12,9 +12,10 @@ class Kind(StrEnum):
     """Kinds of plug-in that can be started and checked."""
 
     METHOD = "method"
+    DATASET = "dataset"
 
 
-TEMPLATE = '''"""{title}: replace this by what the method is."""
+METHOD = '''"""{title}: replace this by what the method is."""
 
 from dataclasses import dataclass
 
@@ -46,28 +47,63 @@ class {cls}:
         return Estimate(so3.project(blocks), notes=("weights used",) if self.weighted else ())
 '''
 
+DATASET = '''"""{title}: replace this by what the scenes are."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bench import Instance, Problem, Source, dataset, parameter, so3, stream
+
+
+@dataset("{name}", title="{title}")
+@dataclass(frozen=True)
+class {cls}:
+    """Complete graphs with Gaussian noise. Fields are parameters: ``{name}[n=50]``."""
+
+    n: int = parameter(20, at_least=2)
+    noise_deg: float = parameter(5.0, at_least=0)
+
+    def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source]:
+        """One a scene, not loaded. Of files: look in data_dir, hash their bytes for revisions, leave seeded out."""
+        name = f"n{{self.n}}-noise{{self.noise_deg:g}}"
+        revision = f"1-{{name}}-seed{{seed}}"  # raise the 1 when the code below changes
+        yield Source(name, revision, lambda: self._load(name, revision, seed), seeded=True)
+
+    def _load(self, name: str, revision: str, seed: int) -> Instance:
+        """R_ij = R_i R_j^T, where R_i maps world to camera and i < j; NaN marks a camera whose truth is unknown."""
+        rng = stream(seed, "data", "{name}")
+        truth = so3.random(rng, self.n)
+        i, j = np.triu_indices(self.n, k=1)
+        noise = so3.exp(np.radians(self.noise_deg) * rng.standard_normal((len(i), 3)))
+        measured = truth[i] @ np.swapaxes(truth[j], -1, -2) @ noise
+        return Instance(Problem(self.n, np.stack([i, j], axis=1), measured), truth, name, revision=revision)
+'''
+TEMPLATES = {Kind.METHOD: METHOD, Kind.DATASET: DATASET}
+
 
 def new(
     kind: Annotated[Kind, typer.Argument()],
     name: Annotated[str, typer.Argument(help="Lower case words joined by hyphens.")],
     into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder for the file.")] = Path(),
 ) -> None:
-    """Write a working method of one file, to be replaced by yours."""
+    """Write a working method or dataset of one file, to be replaced by yours."""
     from bench.core.errors import InputError
     from bench.core.program import program
 
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
         raise InputError(
-            f"'{name}' is not a name for a {kind.value}: use lower case words joined by hyphens, like 'my-method'"
+            f"'{name}' is not a name for a {kind.value}: use lower case words joined by hyphens, like 'my-{kind}'"
         )
     path = into / f"{name.replace('-', '_')}.py"
     if path.exists():
         raise InputError(f"{path} exists already; choose another name or folder")
     into.mkdir(parents=True, exist_ok=True)
     words = name.split("-")
-    path.write_text(
-        TEMPLATE.format(name=name, title=" ".join(words).capitalize(), cls="".join(w.capitalize() for w in words)),
-        encoding="utf-8",
-    )
-    typer.echo(f"wrote {path}; next:\n  {program()} check method {name} --plugin {path}")
-    typer.echo(f"  {program()} run --plugin {path}")
+    cls = "".join(word.capitalize() for word in words)
+    text = TEMPLATES[kind].format(name=name, title=" ".join(words).capitalize(), cls=cls)
+    path.write_text(text, encoding="utf-8")
+    typer.echo(f"wrote {path}; next:\n  {program()} check {kind} {name} --plugin {path}")
+    typer.echo(f"  {program()} run --plugin {path}{f' -d {name}' if kind is Kind.DATASET else ''}")

@@ -165,6 +165,8 @@ class PhaseMap:
             tell(f"round {number}: {len(batch)} samples{f', {stored} of them stored' if stored else ''}")
             if part.todo:
                 part.prepare()
+                if part.unloaded:  # a sample that was never a problem is no failure of the method
+                    raise InputError("; ".join(part.unloaded))
                 execute(part)
             for method, sample in batch:
                 self._count(method, sample)

@@ -17,10 +17,11 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, overload
 
-from bench.core.errors import InputError, described, shown, suggestion
+from bench.core.errors import InputError, shown, suggestion
 from bench.plugins import selection
 from bench.plugins.configure import parameters_of
 from bench.plugins.declare import INFO, DatasetInfo, Info, MethodInfo
+from bench.plugins.faults import located
 
 PACKAGES = {"method": "bench.methods", "dataset": "bench.datasets"}
 ENTRY_POINTS = {"method": "rotsync_bench.methods", "dataset": "rotsync_bench.datasets"}
@@ -43,7 +44,11 @@ class Catalog(Generic[Declared]):
         for origin, why in self.broken.items():
             if origin.removesuffix(".py").replace("/", ".").split(".")[-1].replace("_", "-") == name:
                 raise InputError(f"{self.kind} '{name}' is broken: {why}")
-        raise InputError(f"there is no {self.kind} {shown(name)}{suggestion(name, self.entries)}")
+        own = [why for origin, why in self.broken.items() if _is_file(origin)]  # the user's, which may declare it
+        raise InputError(
+            f"there is no {self.kind} {shown(name)}"
+            + (f", and a plug-in is broken: {'; '.join(own)}" if own else suggestion(name, self.entries))
+        )
 
     def __iter__(self) -> Iterator[Declared]:
         return iter(self.entries.values())
@@ -92,7 +97,7 @@ def catalog(kind: str, plugins: Sequence[str | Path] = ()) -> Catalog[Any]:
     InputError
         On two plug-ins with one name, or a plug-in file that does not exist.
     """
-    return scan(kind, [*_builtin(kind), *_entry_points(kind), *(_plugin_path(p) for p in plugins)])
+    return scan(kind, [*_builtin(kind), *_entry_points(kind), *(plugin_path(p) for p in plugins)])
 
 
 def default_method() -> str:
@@ -108,7 +113,7 @@ def scan(kind: str, origins: Iterable[str]) -> Catalog[Any]:
         try:
             found = infos(import_origin(origin), kind)
         except (Exception, SystemExit) as error:  # a plug-in may fail in any way, and must stay visible
-            broken[origin] = described(error)
+            broken[origin] = located(error, origin)
             continue
         for info in found:
             if info.name in entries:
@@ -119,9 +124,13 @@ def scan(kind: str, origins: Iterable[str]) -> Catalog[Any]:
     return Catalog(kind, entries, broken)
 
 
+def _is_file(origin: str) -> bool:
+    return origin.endswith(".py")
+
+
 def import_origin(origin: str) -> types.ModuleType:
     """Import a plug-in module by dotted name, or by path where the origin ends in ``.py``."""
-    if not origin.endswith(".py"):
+    if not _is_file(origin):
         return importlib.import_module(origin)
     name = f"rotsync_plugin_{hashlib.sha256(origin.encode()).hexdigest()[:12]}"
     if name in sys.modules:
@@ -148,7 +157,8 @@ def _entry_points(kind: str) -> list[str]:
     return sorted({point.module for point in entry_points(group=ENTRY_POINTS[kind])})
 
 
-def _plugin_path(path: str | Path) -> str:
+def plugin_path(path: str | Path) -> str:
+    """The origin of a plug-in file; `InputError` where there is none."""
     try:
         resolved = Path(path).resolve()
         if resolved.is_file() and resolved.suffix == ".py":

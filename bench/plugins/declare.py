@@ -21,6 +21,7 @@ from bench.plugins.source_hash import hash_of_module
 INFO = "__rotsync_info__"
 _DEFAULTS: Mapping[str, Any] = MappingProxyType({})
 _WANTS_PACKAGES = "requires must be a tuple of top-level packages, such as ('numpy',)"
+_ARGUMENTS = {"method": "self, problem, rng", "dataset": "self, data_dir, seed"}
 _NAME = re.compile(r"[^\s\[\],='\"]+")
 
 T = TypeVar("T", bound=type)
@@ -251,13 +252,16 @@ def _declare(
             raise TypeError(f"{kind} '{name}': its title and cite must be text")
         if not _are_packages(requires):
             raise TypeError(f"{kind} '{name}': {_WANTS_PACKAGES}")
-        if not dataclasses.is_dataclass(cls):
+        made = cls.__dict__.get("__dataclass_params__")
+        if made is None:
             raise TypeError(f"{kind} '{name}': put @dataclass(frozen=True) below the @{kind} decorator")
+        if not made.frozen:
+            raise TypeError(f"{kind} '{name}' could change its parameters as it runs: put @dataclass(frozen=True)")
         if not callable(getattr(cls, verb, None)):
-            raise TypeError(f"{kind} '{name}' has no method called {verb}")
+            raise TypeError(f"{kind} '{name}' has no method called {verb}: define {verb}({_ARGUMENTS[kind]})")
         for f in dataclasses.fields(cls):
             if default_of(f) is dataclasses.MISSING:
-                raise TypeError(f"{kind} '{name}': parameter '{f.name}' needs a default")
+                raise TypeError(f"{kind} '{name}': parameter '{f.name}' needs a default: write {f.name}: ... = VALUE")
         setattr(cls, INFO, INFOS[kind](kind, name, title, cite, requires, cls, facts=facts))
         return cls
 

@@ -3,19 +3,23 @@
 Each check solves small problems whose answer is known, in the supervised child that a run would use.
 """
 
-from collections.abc import Callable, Iterator
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from bench.core import outcome, so3
+from bench.core import so3
 from bench.core.errors import InputError
 from bench.core.limits import Limits
 from bench.core.problem import Floats, Problem, oriented
 from bench.execution.single import Answer, SingleSolver
 from bench.plugins.declare import MethodInfo
 from bench.plugins.references import cite_keys, references
+
+Kit = TypeVar("Kit")
 
 LIMITS = Limits(seconds=60, memory_gib=4)
 CAMERAS = 12
@@ -24,6 +28,10 @@ NOISE_DEG = 2.0
 
 class Failed(Exception):  # noqa: N818 - the finding of a check
     """A check did not hold; the message says how."""
+
+
+class BrokenError(Failed):
+    """The method gave no answer; the message says how it ended, and where in its own code."""
 
 
 class NotApplicable(Exception):  # noqa: N818 - the finding of a check
@@ -40,19 +48,40 @@ class Finding:
 
 
 def check_method(info: MethodInfo, parameters: dict[str, Any]) -> Iterator[Finding]:
-    """Run every check on a configured method, yielding each finding as it is made."""
+    """Run every check on a configured method, yielding each finding as it is made.
+
+    A fault is told once: a method without an answer to an ordinary problem is not asked further.
+
+    Raises
+    ------
+    InputError
+        Where packages that it requires are not installed.
+    """
+    if info.not_installed(parameters):
+        raise InputError(f"method '{info.name}' cannot be checked before: {info.install_hint(parameters)}")
     with SingleSolver(info, parameters, LIMITS) as solver:
         kit = _Kit(info, solver)
-        for check in CHECKS:
-            name = check.__name__.strip("_").replace("_", " ")
-            try:
-                check(kit)
-            except Failed as finding:
-                yield Finding(name, "failed", str(finding))
-            except NotApplicable as finding:
-                yield Finding(name, "skipped", str(finding))
-            else:
-                yield Finding(name, "passed")
+        yield from findings(CHECKS, kit)
+
+
+def findings(checks: Iterable[Callable[[Kit], None]], kit: Kit) -> Iterator[Finding]:
+    """Make checks one after another; the same fault is told once, and `BrokenError` in the first ends them."""
+    told: dict[str, str] = {}
+    for check in checks:
+        name = check.__name__.strip("_").replace("_", " ")
+        try:
+            check(kit)
+        except Failed as finding:
+            yield Finding(name, "failed", f"as in: {told[str(finding)]}" if str(finding) in told else str(finding))
+            if isinstance(finding, BrokenError) and not told:
+                yield Finding("every other check", "skipped", "not made before this one holds")
+                return
+            told.setdefault(str(finding), name)
+        except NotApplicable as finding:
+            yield Finding(name, "skipped", str(finding))
+        else:
+            yield Finding(name, "passed")
+            told.setdefault("", name)
 
 
 @dataclass(frozen=True)
@@ -86,10 +115,8 @@ class _Kit:
             return self._rotations(solver.solve(problem, seed))
 
     def _rotations(self, answer: Answer) -> Floats:
-        if answer.outcome.kind == outcome.NOT_INSTALLED:
-            raise NotApplicable(answer.outcome.text)
         if answer.estimate is None:
-            raise Failed(f"{answer.outcome.text} {answer.log.strip()[-300:]}".strip())
+            raise BrokenError(_ending(answer, self.info))
         return answer.estimate.rotations
 
     def recovers(self, problem: Problem, truth: Floats) -> None:
@@ -190,11 +217,11 @@ def _deterministic_as_declared(kit: _Kit) -> None:
 
 
 CHECKS: tuple[Callable[[_Kit], None], ...] = (
+    _exact_recovery,
     _two_cameras,
     _triangle,
     _ring,
     _tree,
-    _exact_recovery,
     _disconnected_graph,
     _relabelled_cameras,
     _permuted_edges,
@@ -204,6 +231,15 @@ CHECKS: tuple[Callable[[_Kit], None], ...] = (
     _deterministic_as_declared,
     _reference,
 )
+
+
+def _ending(answer: Answer, info: MethodInfo) -> str:
+    """How a method ended without an answer: the line of its own file where it raised, else what it printed last."""
+    file = str(sys.modules[info.cls.__module__].__file__)
+    lines = re.findall(rf'File "{re.escape(file)}", line (\d+)', answer.log)
+    if lines:
+        return f"{file}:{lines[-1]}: {answer.outcome.text}"
+    return f"{answer.outcome.text} {answer.log.strip()[-300:]}".strip()
 
 
 def _compare(found: Floats, wanted: Floats, tolerance_deg: float, what: str) -> None:

@@ -16,6 +16,7 @@ from bench.execution.execute import Ended
 from bench.execution.single import Answer, SingleSolver, answer, request_in
 from bench.plugins.catalog import catalog
 from bench.plugins.declare import MethodInfo, Missing, Source
+from bench.plugins.sources import sources_of
 from bench.storage.record import Record
 from bench.storage.store import Store, read_json
 from bench.suite.experiment import instance_key
@@ -153,7 +154,7 @@ def _source(job: Job, data_dir: Path | None, plugins: Sequence[Path]) -> tuple[S
     """The instance as it is today, and its key."""
     ((info, parameters),) = catalog("dataset", plugins).select([job.dataset])
     configured = info.configure(parameters)
-    for found in configured.sources(data_dir, job.seed):
+    for found in sources_of(info, configured, data_dir, job.seed):
         if found.name == job.instance:
             if isinstance(found, Missing):
                 raise InputError(f"{job.dataset} {job.instance} is not on disk; get it with: {found.how(info.name)}")

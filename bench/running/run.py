@@ -5,7 +5,7 @@ import copy
 import os
 import shlex
 import sys
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -119,6 +119,7 @@ class Run:
         folder = options.out or RUNS_FOLDER / f"{self.experiment.suite.name}{suffix}"
         self.store = Store.open(folder) if (folder / "plans").is_dir() else Store(folder)
         _check_kind(self.store, options.timing)
+        self.unloaded: tuple[str, ...] = ()  # a sentence for each instance that `prepare` could not load
         self.unreadable: list[str] = []  # a sentence for each record whose job is run again because of that
         chosen = self.experiment.suite
         self.limits = Limits(chosen.timeout_s, chosen.memory_gib, options.threads or 1)
@@ -165,23 +166,44 @@ class Run:
     def prepare(self, tell: Callable[[str], None] = lambda _: None) -> None:
         """Load the instances that are not stored yet, then keep the plan.
 
+        An instance that cannot be loaded costs its own cells: they leave the experiment, which names it as missing.
+
         Raises
         ------
         InputError
-            Where data are malformed; no plan is kept then.
+            Where none can be loaded, or the disk takes none; no plan is kept then.
         """
         self.store.sweep()
         for sentence in self.unreadable:
             tell(sentence.replace("run the same command again", "its job is run again"))
         needed = {cell.job.instance_key for cell in self.todo}
+        lost: dict[str, str] = {}
         for key, cell in {cell.job.instance_key: cell for cell in self.cells}.items():
             if not (self.store.has_instance(key) if key in needed else self.store.problem_path(key).exists()):
-                tell(f"loading {cell.job.dataset} {cell.job.instance}")
-                self.store.add_instance(key, cell.source.load())
+                name = f"{cell.job.dataset} {cell.job.instance}"
+                tell(f"loading {name}")
+                try:
+                    instance = cell.source.load()
+                except InputError as error:
+                    lost[key] = f"{name} cannot be loaded and is left out: {error}"
+                    tell(lost[key])
+                else:
+                    self.store.add_instance(key, instance)
+        self._leave_out(lost)
         command = f"{program()} {shlex.join(sys.argv[1:])}"
         jobs = tuple(cell.job for cell in self.cells)
         baseline = self.baseline if self.options.timing else ""
         self.store.add_plan(Plan(self.experiment.suite.name, jobs, self.experiment.missing, command, baseline))
+
+    def _leave_out(self, lost: Mapping[str, str]) -> None:
+        """Go on without the instances of these keys, each with a sentence that says why."""
+        kept = [cell for cell in self.cells if cell.job.instance_key not in lost]
+        if lost and not kept:
+            raise InputError("; ".join(lost.values()))
+        self.unloaded = tuple(lost.values())
+        missing = (*self.experiment.missing, *self.unloaded)
+        self.experiment = replace(self.experiment, cells=tuple(kept), missing=missing)
+        self.todo = [cell for cell in self.todo if cell.job.instance_key not in lost]
 
     def execute(self) -> Iterator[Finished]:
         """Run what is not done; yield each cell with its record as it is stored."""
@@ -210,7 +232,7 @@ def _resolved(
     own = [str(Path(path).resolve()) for path in options.plugins]
     for origin in own:
         if origin in known_methods.broken:
-            raise InputError(f"--plugin {origin} is broken: {known_methods.broken[origin]}")
+            raise InputError(f"a plug-in is broken: {known_methods.broken[origin]}")
     plugged_in = [info.name for info in known_methods if info.origin in own]
     changes: dict[str, Any] = {
         "methods": tuple(methods) or (*suite.methods, *plugged_in),

@@ -15,6 +15,7 @@ from bench.plugins import selection
 from bench.plugins.catalog import Catalog
 from bench.plugins.configure import parameters_of
 from bench.plugins.declare import Dataset, DatasetInfo, MethodInfo, Missing, Source
+from bench.plugins.sources import sources_of
 from bench.suite.plan import Job
 
 DEFAULT_SUITE = "quick"
@@ -147,7 +148,7 @@ def resolve(
         configured = info.configure(parameters)
         label = selection.format_selection(info.name, parameters)
         for seed in range(suite.seeds):
-            for source in configured.sources(data_dir, seed):
+            for source in sources_of(info, configured, data_dir, seed):
                 if isinstance(source, Missing):
                     names = missing.setdefault((info.name, source.how(info.name)), [])
                     names += [source.name] if source.name not in names else []
