@@ -29,10 +29,10 @@ class Cycles:
     residuals: Floats
 
 
-def sample_cycles(problem: Problem) -> Cycles:
+def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
     """Triangles drawn uniformly and with replacement; the same ones for the same graph.
 
-    Paths a - c - b are drawn uniformly, the middle c in proportion to the number of its pairs of neighbours; those
+    So many paths a - c - b are drawn uniformly, the middle c in proportion to the number of its pairs of neighbours; those
     that an edge (a, b) closes are kept, and the others not replaced. Every triangle is closed from three paths, so none
     is preferred.
     """
@@ -46,9 +46,9 @@ def sample_cycles(problem: Problem) -> Cycles:
     pairs = degree * (degree - 1)
     if not pairs.any():
         return Cycles(np.empty((0, 3), dtype=np.intp), np.empty(0))
-    middle = rng.choice(problem.n, SAMPLE, p=pairs / pairs.sum()).astype(np.intp)
-    first = (rng.random(SAMPLE) * degree[middle]).astype(np.int64)
-    second = (first + 1 + (rng.random(SAMPLE) * (degree[middle] - 1)).astype(np.int64)) % degree[middle]
+    middle = rng.choice(problem.n, size, p=pairs / pairs.sum()).astype(np.intp)
+    first = (rng.random(size) * degree[middle]).astype(np.int64)
+    second = (first + 1 + (rng.random(size) * (degree[middle] - 1)).astype(np.int64)) % degree[middle]
     one, other = graph.indptr[middle] + first, graph.indptr[middle] + second
     a, b = graph.indices[one].astype(np.intp), graph.indices[other].astype(np.intp)
     closing = np.asarray(graph[a, b]).ravel().astype(np.intp) - 1
