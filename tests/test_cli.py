@@ -29,6 +29,7 @@ COLUMNS = [
     "seed",
     "protocol",
     "alignment",
+    "outcome",
     "status",
     "mean_deg",
     "median_deg",
