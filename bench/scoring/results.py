@@ -121,7 +121,7 @@ def score(
         *used,
         *notes_on_versions(jobs),
         *scores.unreadable,
-        *(plans[-1].missing if plans else ()),
+        *dict.fromkeys(itertools.chain(*{plan.source: plan.missing for plan in plans}.values())),
     ]
     return Results(frame, errors, ties, tuple(footnotes), rule, curves, JobErrors(scores))
 
