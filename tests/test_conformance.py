@@ -115,6 +115,18 @@ class Breaks:
     def solve(self, problem, rng):
         return so3.project(problem)
 """
+TRANSPOSED = """
+from dataclasses import dataclass
+import numpy as np
+from bench import method
+from bench.methods.spanning_tree import SpanningTree
+
+@method("transposed", title="Transposed")
+@dataclass(frozen=True)
+class Transposed:
+    def solve(self, problem, rng):
+        return np.swapaxes(SpanningTree().solve(problem, rng).rotations, -1, -2)
+"""
 
 
 def broken(folder: Path, requires: str = "()") -> list[Finding]:
@@ -128,6 +140,14 @@ def test_a_method_that_always_fails_says_so_once_with_file_and_line(tmp_path: Pa
     assert first.result == "failed"
     assert first.detail == f"{tmp_path}/breaks.py:10: error(NameError: name 'so3' is not defined)"
     assert rest.result == "skipped"
+
+
+def test_an_answer_in_the_other_convention_is_called_so(tmp_path: Path) -> None:
+    path = tmp_path / "transposed.py"
+    path.write_text(TRANSPOSED)
+    found = list(check_method(catalog("method", [path])["transposed"], {}))
+    assert found[0].detail.startswith("the answer is right but transposed: R_ij = R_i R_j^T")
+    assert [f.detail for f in found[1:6]] == ["as in: exact recovery"] * 5
 
 
 def test_what_is_not_installed_is_refused_once(tmp_path: Path) -> None:

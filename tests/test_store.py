@@ -179,6 +179,35 @@ def test_a_merge_prefers_what_ended_well_and_tells_what_differs_or_cannot_be_rea
     assert kind(one, raised) == "error"
 
 
+def test_a_merge_of_two_versions_of_a_method_shows_both(faulty_plugin: Path, tmp_path: Path) -> None:
+    methods, both = ["faulty[fault=random]", "spanning-tree"], tmp_path / "both"
+    edited = tmp_path / "edited" / "faulty.py"
+    edited.parent.mkdir()
+    edited.write_text(faulty_plugin.read_text().replace("so3.random(rng, problem.n)", "1 / 0"))
+    old, new = planned(faulty_plugin, tmp_path / "old", methods), planned(edited, tmp_path / "new", methods)
+    version = old.cells[0].job.source_hash[:4]
+    finish(old), finish(new)
+    merge([tmp_path / "new", tmp_path / "old"], both)
+    rows = [(row["instance"], row["method"], row["title"], row["outcome"]) for row in table(both)]
+    assert rows == [
+        (toy, *row)
+        for toy in ("toy3", "toy4")
+        for row in (
+            ("faulty", "Faulty", "error"),
+            (f"faulty@{version}", f"Faulty @{version}", "ok"),
+            ("spanning-tree", "Spanning tree", "ok"),
+        )
+    ]
+    note = f"faulty@{version} is an older version of faulty, from another of the runs that were merged"
+    assert note in score(Store.open(both)).footnotes
+    assert examine(both) == []
+    merge([both], tmp_path / "again")  # what was merged before stays apart
+    assert table(tmp_path / "again") == table(both)
+    merge([tmp_path / "old"], tmp_path / "new")  # into one of the two
+    assert sorted(map(str, table(tmp_path / "new"))) == sorted(map(str, table(both)))
+    assert "toy" in bench("table", both, "--format", "markdown").stdout
+
+
 def kind(store: Store, job_id: str) -> str:
     record = store.record(job_id)
     assert record is not None

@@ -22,7 +22,8 @@ def bibtex(run: RunFolder) -> None:
     from bench.plugins.references import bibliography, cite_keys
     from bench.storage.store import Store
 
-    used = list(_used(Store.open(run_folder(run)).jobs()))
+    plans = Store.open(run_folder(run)).plans()
+    used = list(_used([job for plan in plans for job in plan.jobs]))
     typer.echo("\n\n".join(bibliography(used).values()))
     for info in used:
         if not cite_keys(info):
@@ -34,7 +35,8 @@ def _used(jobs: "list[Job]") -> "Iterator[Info]":
     from bench.plugins import selection
     from bench.plugins.catalog import catalog
 
-    plugins = [path for path in dict.fromkeys(job.origin for job in jobs) if Path(path).is_file()]
+    newest = {job.method: job.origin for job in jobs}  # a run may hold two versions of a file
+    plugins = [path for path in dict.fromkeys(newest.values()) if Path(path).is_file()]
     names = {
         "dataset": dict.fromkeys(selection.parse(job.dataset).name for job in jobs),
         "method": dict.fromkeys(job.method for job in jobs),

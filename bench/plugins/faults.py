@@ -3,7 +3,7 @@
 import traceback
 from pathlib import Path
 
-from bench.core.errors import described
+from bench.core.errors import described, shown
 
 
 def located(error: BaseException, origin: str) -> str:
@@ -16,7 +16,7 @@ def located(error: BaseException, origin: str) -> str:
     """
     place, told = innermost(error, Path(origin).parent) or origin, error
     if isinstance(error, SyntaxError) and error.filename and error.lineno:
-        place, told = f"{error.filename}:{error.lineno}", type(error)(error.msg)
+        place, told = " ".join(f"{error.filename}:{error.lineno}".split()), SyntaxError(error.msg)
     return f"{place}: {described(told)}{_remedy(error)}"
 
 
@@ -29,10 +29,10 @@ def innermost(error: BaseException, folder: Path) -> str:
 
 def _remedy(error: BaseException) -> str:
     if isinstance(error, ModuleNotFoundError) and error.name:
-        package = error.name.partition(".")[0]
+        package = shown(str(error.name).partition(".")[0])
         return (
             f"; mend its name or install it; a package that only some need is imported where it is used, "
-            f"and declared with requires=('{package}',)"
+            f"and declared with requires=({package},)"
         )
     if isinstance(error, SyntaxError):
         return "; Python cannot read it from there on"

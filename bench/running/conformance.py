@@ -24,6 +24,7 @@ Kit = TypeVar("Kit")
 LIMITS = Limits(seconds=60, memory_gib=4)
 CAMERAS = 12
 NOISE_DEG = 2.0
+CONVENTION = "R_ij = R_i R_j^T, where R_i maps world to camera"
 
 
 class Failed(Exception):  # noqa: N818 - the finding of a check
@@ -245,10 +246,16 @@ def _ending(answer: Answer, info: MethodInfo) -> str:
 def _compare(found: Floats, wanted: Floats, tolerance_deg: float, what: str) -> None:
     if np.isnan(found).any():
         raise Failed(f"{np.isnan(found).all(axis=(1, 2)).sum()} cameras of a connected graph were not solved")
-    gauge = so3.chordal_mean(np.swapaxes(found, -1, -2) @ wanted)
-    worst = np.degrees(so3.angle_between(found @ gauge, wanted).max())
+    worst = _worst_deg(found, wanted)
     if worst > tolerance_deg:
+        if _worst_deg(np.swapaxes(found, -1, -2), wanted) <= tolerance_deg:
+            raise Failed(f"the answer is right but transposed: {CONVENTION}")
         raise Failed(f"a camera is {worst:.3g} degrees {what}; the method promises {tolerance_deg:g}")
+
+
+def _worst_deg(found: Floats, wanted: Floats) -> float:
+    gauge = so3.chordal_mean(np.swapaxes(found, -1, -2) @ wanted)
+    return float(np.degrees(so3.angle_between(found @ gauge, wanted).max()))
 
 
 def _exact(n: int, edges: list[tuple[int, int]]) -> tuple[Problem, Floats]:

@@ -20,7 +20,7 @@ from bench.scoring.metrics.errors import summary
 from bench.scoring.metrics.oracle import ORACLE, Curve, curve
 from bench.scoring.metrics.speedup import speedup
 from bench.storage.store import Store
-from bench.suite.plan import Job, newest
+from bench.suite.plan import Job, newest, notes_on_versions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,8 +125,9 @@ def score(
     footnotes = [
         *_instance_notes(frame, scores.table),
         *used,
+        *notes_on_versions(jobs),
         *scores.unreadable,
-        *(plans[-1].missing if plans else ()),
+        *dict.fromkeys(itertools.chain(*{plan.source: plan.missing for plan in plans}.values())),
     ]
     return Results(frame, errors, ties, tuple(footnotes), rule, curves, job_errors)
 

@@ -3,9 +3,10 @@
 import contextlib
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from bench.core.digest import digest
 from bench.core.errors import InputError
 from bench.storage.record import Record
 from bench.storage.store import Store
@@ -35,7 +36,7 @@ def merge(sources: Sequence[Path], into: Path) -> Merged:
 
     A merge that was interrupted can be done again. Where both folders have a record of the same job, one that ended
     well goes before one that did not, then the one that was there goes before a later one that ended well too, and a
-    later failure before an earlier one.
+    later failure before an earlier one. Two versions of one method stay two; see `bench.suite.plan.newest`.
 
     Raises
     ------
@@ -54,8 +55,11 @@ def merge(sources: Sequence[Path], into: Path) -> Merged:
             _merge_record(store, target, path.stem, merged)
         for path in sorted(store.folder.glob("instances/*")):
             _merge_instance(store, target, path.name, merged)
-        for plan in sorted(store.folder.glob("plans/*.json")):
-            target.copy_in(plan, target.folder / "plans" / plan.name)
+        paths = sorted(store.folder.glob("plans/*.json"))
+        run = digest([str(store.folder.resolve()), paths[0].name])[:8] if paths else ""
+        for path in paths:
+            plan = store.plan(path)
+            target.add_plan(replace(plan, source=plan.source or run), path.name)
     return merged
 
 

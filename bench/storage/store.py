@@ -80,10 +80,14 @@ class Store:
         _check_version(folder / VERSION)
         return cls(folder)
 
-    def add_plan(self, plan: Plan) -> None:
-        """Keep a plan."""
+    def add_plan(self, plan: Plan, name: str = "") -> None:
+        """Keep a plan; one of another run under its name there, unless it is here already."""
         self.mark()
         content = encode(plan)
+        if name:
+            if not (self.folder / "plans" / name).exists():
+                self._write_json(self.folder / "plans" / name, content, indent=None)
+            return
         moment = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%f")
         self._write_json(self.folder / "plans" / f"{moment}-{digest(content)[:8]}.json", content, indent=None)
 

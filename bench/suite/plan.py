@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from bench.core import typed
@@ -73,6 +73,8 @@ class Plan:
         Name of the suite, its jobs, a sentence for what is not on disk, and what was typed.
     baseline
         Of a timing run: the configured method that the others are compared with, as a selection.
+    source
+        Which of the runs that were merged it came from; empty where it was made in this folder.
     """
 
     suite: str
@@ -80,6 +82,7 @@ class Plan:
     missing: tuple[str, ...] = ()
     command: str = ""
     baseline: str = ""
+    source: str = ""
 
     @property
     def timing(self) -> bool:
@@ -88,13 +91,42 @@ class Plan:
 
 
 def newest(plans: Sequence[Plan]) -> list[Job]:
-    """The newest job of every cell that was ever planned, in the order of planning."""
+    """The newest job of every cell that was ever planned, in the order of planning.
+
+    Of runs that were merged each has its own newest; where their methods differ in source, the older ones follow as
+    ``method@version``, the version being the start of the source's hash.
+    """
     if len(plans) == 1:
         return list(plans[0].jobs)
-    jobs: dict[tuple[str, str, str, str, int], Job] = {}
+    by_source: dict[str, dict[tuple[str, str, str, str, int], Job]] = {}
+    merged: dict[tuple[str, str, str, str, int], Job] = {}
     for plan in plans:
-        jobs |= {job.cell: job for job in plan.jobs}
-    return list(jobs.values())
+        jobs = {job.cell: job for job in plan.jobs}
+        by_source[plan.source] = by_source.get(plan.source, {}) | jobs
+        merged |= jobs
+    if len(by_source) == 1:
+        return list(merged.values())
+    return [job for cell, job in merged.items() for job in _versions(job, [of.get(cell) for of in by_source.values()])]
+
+
+def _versions(newest_one: Job, others: Sequence[Job | None]) -> list[Job]:
+    """A job, and once each those of other sources of its method, renamed."""
+    of_hash = {job.source_hash: job for job in others if job is not None and job.source_hash != newest_one.source_hash}
+    return [newest_one, *(_renamed(job) for job in of_hash.values())]
+
+
+def _renamed(job: Job) -> Job:
+    version = f"@{job.source_hash[:4]}"
+    return replace(job, method=job.method + version, title=f"{job.title} {version}")
+
+
+def notes_on_versions(jobs: Sequence[Job]) -> list[str]:
+    """A sentence for every method of which `newest` gave an older version too."""
+    older = {job.method: None for job in jobs if job.method.endswith(f"@{job.source_hash[:4]}")}
+    return [
+        f"{name} is an older version of {name.rpartition('@')[0]}, from another of the runs that were merged"
+        for name in older
+    ]
 
 
 @dataclass(frozen=True)
@@ -141,6 +173,7 @@ class _Written:
     instances: tuple[_Place, ...]
     methods: tuple[_Configured, ...]
     jobs: _Columns
+    source: str = ""
 
 
 def encode(plan: Plan) -> dict[str, Any]:
@@ -157,7 +190,8 @@ def encode(plan: Plan) -> dict[str, Any]:
             configured.append(_Configured(job.method, job.title, job.origin, job.parameters, job.source_hash, job.use))
         rows.append((job.id, places.setdefault(place, len(places)), methods[spelled], job.seed, job.rounds))
     columns = _Columns(*map(tuple, zip(*rows, strict=True))) if rows else _Columns((), (), (), (), ())
-    written = _Written(plan.suite, plan.command, plan.baseline, plan.missing, tuple(places), tuple(configured), columns)
+    shared = tuple(places), tuple(configured), columns
+    written = _Written(plan.suite, plan.command, plan.baseline, plan.missing, *shared, plan.source)
     parts = {"instances": list(map(vars, places)), "methods": list(map(vars, configured)), "jobs": vars(columns)}
     return vars(written) | parts  # not `asdict`, which would copy every entry of the columns
 
@@ -186,4 +220,4 @@ def decode(content: Mapping[str, Any], where: str) -> Plan:
         )
     except (ValueError, IndexError) as error:
         raise InputError(f"{where}: its jobs do not fit together ({error})") from error
-    return Plan(read.suite, jobs, read.missing, read.command, read.baseline)
+    return Plan(read.suite, jobs, read.missing, read.command, read.baseline, read.source)
