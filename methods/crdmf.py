@@ -7,12 +7,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import Checkpoint, Estimate, Floats, Problem, method, parameter
+from bench import Checkpoint, Estimate, Floats, Problem, method, parameter, so3
 
 from ._lib.dmf import crdmf_dense, dmf_thin
 from ._lib.dmf.dmf_thin import Factors, Observed, chordal
 from ._lib.dmf.presets import Presets
 from ._lib.graph.all_triangles import AllTriangles
+from ._lib.graph.confidence import confidence
+from ._lib.graph.restricted import restricted
 from ._lib.graph.trees import propagated, tree_edges
 from ._lib.linear.rounding import nearest_rotations
 from ._lib.starts import SEEDED, Start, start_rotations
@@ -32,7 +34,8 @@ class CRDMF(Presets):
     """Fits E = P P^T, P having three columns and d factors, to the measured blocks in the weighted l1 norm.
 
     1. Spanning tree: an edge is supported by the triangles at it whose loop error |R_ij R_jk - R_ik| is below the
-       median of all triangles. The tree of largest support is taken; ties go to the smaller mean error.
+       median of all triangles. The tree of largest support is taken; ties go to the smaller mean error,
+       then to the larger `confidence`.
     2. Filter: remove every edge that differs from what the tree predicts by a Frobenius norm of 1 (41.4 degrees) or
        more. The tree's own edges stay, so that the graph stays connected.
     3. Descend on the weighted mean absolute misfit of the remaining blocks, in both directions, and of the n
@@ -70,7 +73,7 @@ class CRDMF(Presets):
     preset
         "thin" or "paper". What is None below follows from it.
     init
-        Of thin: where to start, see `start_rotations`. None: "spectral".
+        Of thin: where to start, see `start_rotations`. None: "auto".
     candidates
         How many, from 1 to 10. None: 4 for thin, 10 for paper. A deterministic start makes equal depths equal.
     iterations
@@ -98,6 +101,11 @@ class CRDMF(Presets):
         self.refuse(*(("init_scale", "device") if self.preset == "thin" else ("init",)))
 
     @property
+    def uses(self) -> tuple[str, ...]:
+        """The paper weighs edges by their errors alone; thin begins with the `confidence` of the edges."""
+        return ("weights", "precisions") if self.preset == "thin" else ()
+
+    @property
     def deterministic(self) -> bool:
         """The thin form draws nothing but a random start."""
         return self.preset == "thin" and self.init not in SEEDED
@@ -121,14 +129,15 @@ class CRDMF(Presets):
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         clock = time.perf_counter()
         kept = agrees_with_tree(problem)
-        filtered = Problem(problem.n, problem.edges[kept], problem.rotations[kept])
+        filtered = restricted(problem, kept)
+        trust = confidence(filtered)
         thin = self.preset == "thin"
         depths = DEPTHS[: self.candidates or (4 if thin else len(DEPTHS))]
         run = self._thin_run if thin else self._dense_run
         best, best_misfit, checkpoints = None, np.inf, list[Checkpoint]()
         for depth in depths:
             rotations, weights, cost = run(filtered, depth, rng)
-            misfit = float(filtered.residuals(rotations).mean())
+            misfit = float((trust * filtered.residuals(rotations)).mean())
             if misfit < best_misfit:
                 best, best_misfit = (depth, rotations, weights, cost), misfit
             seconds = time.perf_counter() - clock
@@ -163,10 +172,11 @@ class CRDMF(Presets):
     def _thin_run(self, problem: Problem, depth: int, rng: np.random.Generator) -> Run:
         observed = Observed.of(problem)
         scale = np.sqrt(np.repeat(observed.count, 3))[:, None]
-        start = start_rotations(self.init or "spectral", problem, rng).reshape(-1, 3) * scale
+        start = start_rotations(self.init or "auto", problem, rng).reshape(-1, 3) * scale
         vectors, values, _ = np.linalg.svd(start, full_matrices=False)
         factors = Factors.balanced(values**2, vectors, 2 * depth)
-        weights, blocks = np.ones(problem.m), np.ones(len(observed.order), dtype=np.float32)
+        weights = confidence(problem).copy()
+        blocks = observed.weigh(weights)
 
         def rotations() -> Floats:
             half = factors.partial_products()[0][depth - 1]
@@ -175,7 +185,7 @@ class CRDMF(Presets):
         def report(t: int, cost: float) -> None:
             if self._is_reweighted(t):
                 weights[:] *= reweighted(problem, rotations())
-                blocks[:] = np.concatenate([weights, weights, np.ones(problem.n)])[observed.order]
+                blocks[:] = observed.weigh(weights)
 
         cost = dmf_thin.descend(
             observed,
@@ -211,7 +221,8 @@ def agrees_with_tree(problem: Problem) -> NDArray[np.bool_]:
     """(m,) whether each edge is nearer than `FILTER` to the prediction of the tree of largest triangle support."""
     triangles = AllTriangles.of(problem)
     closing = triangles.errors < np.median(triangles.errors) if len(triangles.errors) else np.zeros(0, dtype=np.bool_)
-    by_support = np.lexsort((-triangles.mean_distance(problem.m), triangles.support(closing, problem.m)))
+    tied = -so3.angle(problem.rotations), confidence(problem)  # such as edges in no triangle
+    by_support = np.lexsort((*tied, -triangles.mean_distance(problem.m), triangles.support(closing, problem.m)))
     ranks = np.empty(problem.m)
     ranks[by_support] = np.arange(1, problem.m + 1)
     rotations = propagated(problem, tree_edges(problem, ranks))

@@ -17,7 +17,7 @@ from ._lib.starts import Refined, Start, start_rotations
 FEWEST_TRIANGLES = 30
 
 
-@method("desc", title="DESC", cite="shi2022", requires=("scipy", "numba"), robust=True)
+@method("desc", title="DESC", cite="shi2022", requires=("scipy", "numba"), robust=True, uses=("weights", "precisions"))
 @dataclass(frozen=True)
 class DESC(Refined):
     """Minimises sum_ij sum_k w_ij,k (s_ik + s_jk), with s_ij = sum_k w_ij,k d_ij,k, for the corruption s of the edges.
@@ -35,8 +35,8 @@ class DESC(Refined):
     question), and the descent makes all its steps (theirs may stop when the objective stalls); an edge in no triangle
     counts with the median weight in step 3 and with its residual alone in step 4; weights of the blocks are kept above
     1e-4, and those of least squares above 1e-10 of the largest (there 1e-8, absolute); residuals are those of the moved
-    cameras, and the mean step is removed instead of anchoring a camera. The weights of a problem are not used, except
-    by the spanning-tree start.
+    cameras, and the mean step is removed instead of anchoring a camera. The weights of step 4
+    are multiplied by the `confidence` of the edges.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from ._lib.starts import Refined, Start, start_rotations
 BETA = 32.0
 
 
-@method("mpls", title="MPLS", cite="shi2020", requires=("scipy", "numba"), robust=True)
+@method("mpls", title="MPLS", cite="shi2020", requires=("scipy", "numba"), robust=True, uses=("weights", "precisions"))
 @dataclass(frozen=True)
 class MPLS(Refined):
     """Least squares whose weights come from the residuals of edges and, by message passing, of their triangles.
@@ -29,7 +29,7 @@ class MPLS(Refined):
     Source: Shi and Lerman, ICML 2020, algorithm 2, with the settings of its section 4. Deviations: triangles are
     drawn without replacement; h of an edge in no triangle is its residual; weights are kept above 1e-10 of the largest
     (there 1e-8, absolute); residuals are those of the moved cameras, and the mean step is removed instead of anchoring
-    a camera. The weights of a problem are not used, except by the spanning-tree start.
+    a camera; the weights are multiplied by the `confidence` of the edges.
 
     Parameters
     ----------

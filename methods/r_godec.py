@@ -47,8 +47,7 @@ class RGoDec(Seeded):
     the eigenvectors, not from the block column of one camera. The completed matrix is L plus the measured residuals
     clipped to [-lambda, lambda], of which only the measured blocks are computed: nothing is (3n, 3n), and an
     iteration costs time proportional to the number of edges. It is a gradient step of length one on an entrywise Huber
-    loss, and the less is measured, the slower it is. The weights of a problem are used by the spanning-tree
-    start alone.
+    loss, and the less is measured, the slower it is. The weights of a problem are not used.
 
     Parameters
     ----------
