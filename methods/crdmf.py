@@ -16,6 +16,7 @@ from ._lib.graph.all_triangles import AllTriangles
 from ._lib.graph.confidence import confidence
 from ._lib.graph.restricted import restricted
 from ._lib.graph.trees import propagated, tree_edges
+from ._lib.graph.triangles import note_on_missing
 from ._lib.linear.rounding import nearest_rotations
 from ._lib.starts import SEEDED, Start, start_rotations
 from ._lib.warm_up import solved_once
@@ -28,7 +29,15 @@ SMOOTHING_DEG = (20.0, 0.03)
 Run = tuple[Floats, Floats, float]  # rotations (n, 3, 3), edge weights (m,) and loss of a candidate
 
 
-@method("crdmf", title="CRDMF", cite="li2025", requires=("numba", "scipy"), robust=True, invariant_to_deg=4.0)
+@method(
+    "crdmf",
+    title="CRDMF",
+    cite="li2025",
+    requires=("numba", "scipy"),
+    robust=True,
+    simple_graph=True,
+    invariant_to_deg=4.0,
+)
 @dataclass(frozen=True)
 class CRDMF(Presets):
     """Fits E = P P^T, P having three columns and d factors, to the measured blocks in the weighted l1 norm.
@@ -128,7 +137,8 @@ class CRDMF(Presets):
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         clock = time.perf_counter()
-        kept = agrees_with_tree(problem)
+        triangles = AllTriangles.of(problem)
+        kept = agrees_with_tree(problem, triangles)
         filtered = restricted(problem, kept)
         trust = confidence(filtered)
         thin = self.preset == "thin"
@@ -158,6 +168,7 @@ class CRDMF(Presets):
             notes=(
                 f"kept depth {depth} of {len(depths)} candidates",
                 f"{problem.m - len(weights)} edges were filtered",
+                *note_on_missing(triangles.missing(problem.m), "the tree takes them by their angles alone"),
             ),
         )
 
@@ -217,9 +228,8 @@ class CRDMF(Presets):
         return nearest_rotations(network.columns()), weights, network.cost()
 
 
-def agrees_with_tree(problem: Problem) -> NDArray[np.bool_]:
+def agrees_with_tree(problem: Problem, triangles: AllTriangles) -> NDArray[np.bool_]:
     """(m,) whether each edge is nearer than `FILTER` to the prediction of the tree of largest triangle support."""
-    triangles = AllTriangles.of(problem)
     closing = triangles.errors < np.median(triangles.errors) if len(triangles.errors) else np.zeros(0, dtype=np.bool_)
     tied = -so3.angle(problem.rotations), confidence(problem)  # such as edges in no triangle
     by_support = np.lexsort((*tied, -triangles.mean_distance(problem.m), triangles.support(closing, problem.m)))

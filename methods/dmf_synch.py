@@ -12,7 +12,7 @@ from ._lib.dmf import dmf_dense, dmf_thin
 from ._lib.dmf.dmf_thin import Factors, Loss, Observed, Report, Single, chordal
 from ._lib.dmf.presets import Presets
 from ._lib.graph.confidence import confidence, ranking, strengths
-from ._lib.linear.rounding import nearest_rotations
+from ._lib.linear.rounding import nearest_rotations, note_on_mirrored
 from ._lib.linear.spectral import spectral_rotations
 from ._lib.starts import SEEDED, Start, resolved, start_rotations
 from ._lib.warm_up import solved_once
@@ -201,6 +201,7 @@ class DMFSynch(Presets):
             stop_reason="end of the step-size schedule",
             cost=cost,
             checkpoints=tuple(checkpoints),
+            notes=note_on_mirrored(factors.eigenpairs()[1][:, :3]),
         )
 
     def _start(

@@ -14,6 +14,7 @@ from ._lib.graph.confidence import confidence
 from ._lib.graph.hierarchical_tree import hierarchical_tree, support_levels
 from ._lib.graph.restricted import restricted
 from ._lib.graph.trees import tree_edges
+from ._lib.graph.triangles import note_on_missing
 from ._lib.warm_up import Warm
 
 QUANTILES = (0.1, 0.2, 0.3)
@@ -21,7 +22,15 @@ USUAL_ERROR = 1.0  # squared Frobenius norm, 41.4 degrees; larger loop errors te
 ROUNDING = 1e-12  # of a squared Frobenius norm
 
 
-@method("hara", title="HARA", cite="lee2022", requires=("scipy", "numba"), robust=True, uses=("weights", "precisions"))
+@method(
+    "hara",
+    title="HARA",
+    cite="lee2022",
+    requires=("scipy", "numba"),
+    robust=True,
+    simple_graph=True,
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class HARA(Warm):
     """Minimises sum_ij sqrt(angle(R_i^T R_ij R_j)) over the edges that agree with a carefully grown spanning tree.
@@ -68,7 +77,9 @@ class HARA(Warm):
         thresholds = np.maximum(np.quantile(usual, QUANTILES), ROUNDING) if len(usual) else np.zeros(0)
         levels = support_levels(problem, triangles, thresholds, self.support)
         tree = hierarchical_tree(problem, levels, self.support * len(thresholds))
-        notes = [f"{tree.averaged} cameras without triplet support were averaged"] if tree.averaged else []
+        notes = [*note_on_missing(triangles.missing(problem.m), "no triplet supports them")]
+        if tree.averaged:
+            notes.append(f"{tree.averaged} cameras without triplet support were averaged")
         kept = np.ones(problem.m, dtype=np.bool_)
         if len(triangles.errors) and np.median(triangles.errors) > USUAL_ERROR:
             notes.append("no edge was filtered: most triangles are far from closing")

@@ -1,6 +1,6 @@
 """MPLS: message passing least squares."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,13 +8,21 @@ from bench import Estimate, Floats, Problem, method, parameter
 
 from ._lib.descent.cycle_refinement import refined
 from ._lib.graph.cemp import ITERATIONS, TRIANGLES, corruption_levels, tree_of_least_corruption
-from ._lib.graph.triangles import sample_triangles
+from ._lib.graph.triangles import note_on_missing, sample_triangles
 from ._lib.starts import Refined, Start, start_rotations
 
 BETA = 32.0
 
 
-@method("mpls", title="MPLS", cite="shi2020", requires=("scipy", "numba"), robust=True, uses=("weights", "precisions"))
+@method(
+    "mpls",
+    title="MPLS",
+    cite="shi2020",
+    requires=("scipy", "numba"),
+    robust=True,
+    simple_graph=True,
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class MPLS(Refined):
     """Least squares whose weights come from the residuals of edges and, by message passing, of their triangles.
@@ -59,4 +67,5 @@ class MPLS(Refined):
         def by_cycles(residuals: Floats) -> Floats:
             return np.where(triangles.missing, residuals, triangles.weighted_means(np.exp(-BETA * residuals)))
 
-        return refined(problem, start, levels, by_cycles, self.tolerance_deg, self.iterations)
+        found = refined(problem, start, levels, by_cycles, self.tolerance_deg, self.iterations)
+        return replace(found, notes=note_on_missing(triangles.missing, "their residuals alone weigh them"))

@@ -9,7 +9,7 @@ from bench import Estimate, Problem, method, parameter
 
 from ._lib.graph.confidence import confidence
 from ._lib.gtsam_values import rotations_of, values_of
-from ._lib.linear.certificate import chordal_cost, smallest_eigenvalue
+from ._lib.linear.certificate import certified, chordal_cost, smallest_eigenvalue
 from ._lib.linear.spectral import spectral_rotations
 from ._lib.stopwatch import Stopwatch
 from ._lib.warm_up import Warm
@@ -88,11 +88,15 @@ class Shonan(Warm):
             notes = (f"not certified up to p={self.p_max}: a local optimum on SO(3) is returned",)
         with conversion.running():
             rotations = rotations_of(values, problem.n)
+        certificate = smallest_eigenvalue(problem, rotations)
+        if not notes and not certified(problem, certificate):
+            reason = "optimum of the relaxation"
+            notes = (f"not certified: rounding to SO(3) leaves a smallest eigenvalue of {certificate:.1e}",)
         return Estimate(
             rotations,
             stop_reason=reason,
             cost=chordal_cost(problem, rotations),
-            certificate=smallest_eigenvalue(problem, rotations),
+            certificate=certificate,
             conversion_s=conversion.seconds,
             notes=notes,
         )

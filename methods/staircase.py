@@ -8,7 +8,13 @@ import numpy as np
 from bench import Estimate, Floats, Problem, method, parameter
 
 from ._lib.graph.confidence import strengths
-from ._lib.linear.certificate import chordal_cost, smallest_eigenpair, smallest_eigenvalue, weighted_blocks
+from ._lib.linear.certificate import (
+    certified,
+    chordal_cost,
+    smallest_eigenpair,
+    smallest_eigenvalue,
+    weighted_blocks,
+)
 from ._lib.linear.rounding import nearest_rotations
 from ._lib.starts import Seeded, Start, start_rotations
 
@@ -73,14 +79,22 @@ class Staircase(Seeded):
                 break
             points = _escaped(problem, points, direction)
         rotations = _rounded(points)
-        certified = smallest >= -threshold
+        certificate = smallest_eigenvalue(problem, rotations)
+        reason, notes = f"critical point at p = p_max = {p}", tuple[str, ...]()
+        if smallest < -threshold:
+            notes = (f"not certified up to p={p}; the smallest eigenvalue is {smallest:.1e}",)
+        elif certified(problem, certificate):
+            reason = f"certified at p = {p}"
+        else:
+            reason = f"optimum of the relaxation at p = {p}"
+            notes = (f"not certified: rounding from p = {p} leaves a smallest eigenvalue of {certificate:.1e}",)
         return Estimate(
             rotations,
             iterations=iterations,
-            stop_reason=f"certified at p = {p}" if certified else f"critical point at p = p_max = {p}",
+            stop_reason=reason,
             cost=chordal_cost(problem, rotations),
-            certificate=smallest_eigenvalue(problem, rotations),
-            notes=() if certified else (f"not certified up to p={p}; the smallest eigenvalue is {smallest:.1e}",),
+            certificate=certificate,
+            notes=notes,
         )
 
     def _minimised(self, problem: Problem, points: Floats, gradient_norm: float) -> tuple[Floats, int]:

@@ -114,6 +114,7 @@ class TGMCMC(Started):
             else "iteration limit",
             cost=float(CHORDAL * energy[0]),
             checkpoints=tuple(checkpoints),
+            notes=() if converged else (f"not converged: cameras still turned by {np.degrees(rotated):.1e} degrees",),
         )
 
     def _temperature(self, t: int) -> float:

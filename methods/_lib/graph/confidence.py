@@ -23,7 +23,8 @@ def ranking(problem: Problem) -> Floats | None:
 
 def strengths(problem: Problem) -> Floats:
     """(n,) sum of the `confidence` of the edges at each camera; its degree where nothing is known."""
-    return np.bincount(problem.edges.ravel(), np.repeat(confidence(problem), 2), minlength=problem.n)
+    sums = np.bincount(problem.edges.ravel(), np.repeat(confidence(problem), 2), minlength=problem.n)
+    return np.asarray(sums, dtype=np.float64)
 
 
 def has_counts(problem: Problem) -> bool:

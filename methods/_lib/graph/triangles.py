@@ -53,6 +53,12 @@ class Triangles:
         return means
 
 
+def note_on_missing(missing: NDArray[np.bool_], consequence: str) -> tuple[str, ...]:
+    """What to say of the edges in no triangle, the mask (m,) of which is `missing`; nothing where there are none."""
+    count = int(missing.sum())
+    return (f"{count} of {len(missing)} edges in no triangle: {consequence}",) if count else ()
+
+
 def sample_triangles(problem: Problem, most: int, rng: np.random.Generator) -> Triangles:
     """Up to `most` triangles over each edge: all where there are no more, else drawn without replacement.
 

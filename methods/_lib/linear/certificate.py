@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 PRECISION = 1e-10  # of the eigenvalue, relative to the largest one
 LARGE = 1200  # rows; from here on one eigenvalue alone is found faster than a block
+ZERO = 1e-4  # of an eigenvalue, relative to the mean degree
 ROUNDING = 4e-15  # of the cost, for each edge
 
 
@@ -63,6 +64,11 @@ def smallest_eigenvalue(problem: Problem, rotations: Floats) -> float:
     possible one by at most 3n max(0, -lambda_min).
     """
     return smallest_eigenpair(problem, rotations)[0]
+
+
+def certified(problem: Problem, eigenvalue: float) -> bool:
+    """Whether a `smallest_eigenvalue` is zero up to what rounding to rotations leaves of it."""
+    return eigenvalue >= -ZERO * float(problem.degree.mean())
 
 
 def smallest_eigenpair(problem: Problem, rotations: Floats) -> tuple[float, Floats]:

@@ -171,7 +171,8 @@ class _SparseSystem:
 
     def solve(self, weights: Floats, degrees: Floats, right: Floats) -> Floats:
         off_diagonal = -weights[self._kept]
-        self._matrix.data = np.bincount(self._entry, np.concatenate([off_diagonal, off_diagonal, degrees[:-1]]))
+        values = np.concatenate([off_diagonal, off_diagonal, degrees[:-1]])
+        self._matrix.data = np.asarray(np.bincount(self._entry, values), dtype=np.float64)  # parallel edges add up
         x = np.empty_like(right)
         x[self._order] = _factor(self._matrix, "NATURAL").solve(right[self._order])
         return x
