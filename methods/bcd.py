@@ -29,6 +29,7 @@ DEFICIENT = 1e-12  # eigenvalues below it, relative to the largest, count as zer
     max_cameras=500,
     uses=("weights", "precisions"),
     exact_to_deg=1e-5,
+    invariant_to_deg=0.1,  # the cameras take turns by label; it stops at a relative decrease of 1e-9
 )
 @dataclass(frozen=True)
 class BCD(Seeded):

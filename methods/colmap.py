@@ -20,7 +20,8 @@ from ._lib.stopwatch import Stopwatch
     robust=True,
     uses=("weights", "precisions"),
     simple_graph=True,
-    invariant_to_deg=0.5,  # its iterations stop at a mean step of 1e-3 rad
+    invariant_to_deg=None,  # without counts the order of the edges chooses the tree
+    depends_on_labels=True,
 )
 @dataclass(frozen=True)
 class Colmap:

@@ -162,10 +162,8 @@ class DMFSynch(Presets):
 
     @property
     def invariant_to_deg(self) -> float | None:
-        """The entry-wise l1 loss depends on the frames of the cameras, as the dense form does on its random start."""
-        if self.preset != "thin":
-            return 2.0
-        if self.init == "random":
+        """The entry-wise l1 loss depends on the frames of the cameras; a random start is drawn by label."""
+        if self.preset != "thin" or self.init == "random":
             return None
         return 1.0 if self.loss == "l1" else 0.01
 

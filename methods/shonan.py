@@ -23,6 +23,7 @@ HUBER = 1.345  # GTSAM's threshold, in units of sigma
     cite="dellaert2020",
     requires=("gtsam", "scipy", "numba"),
     certifies=True,
+    invariant_to_deg=0.1,  # it stops at a relative decrease of 1e-7
     uses=("weights", "precisions"),
 )
 @dataclass(frozen=True)
