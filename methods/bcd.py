@@ -7,7 +7,8 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, method, parameter
 
-from ._lib.linear.certificate import ROUNDING, chordal_cost, smallest_eigenvalue
+from ._lib.graph.confidence import confidence
+from ._lib.linear.certificate import ROUNDING, chordal_cost, smallest_eigenvalue, weighted_blocks
 from ._lib.linear.rounding import rounded
 from ._lib.starts import Seeded, Start, start_rotations
 
@@ -26,7 +27,9 @@ DEFICIENT = 1e-12  # eigenvalues below it, relative to the largest, count as zer
     requires=("scipy", "numba"),
     certifies=True,
     max_cameras=500,
+    uses=("weights", "precisions"),
     exact_to_deg=1e-5,
+    invariant_to_deg=0.1,  # the cameras take turns by label; it stops at a relative decrease of 1e-9
 )
 @dataclass(frozen=True)
 class BCD(Seeded):
@@ -40,8 +43,8 @@ class BCD(Seeded):
 
     Source: Eriksson et al. 2018, algorithm 1 and lemma 5.1 for step 2. Deviations: none in the iteration. A
     start from rotations is mixed with the identity, because from Y = R R^T the rank would never grow and the
-    iteration would be `rcd`. The certificate belongs to the rounded rotations. The weights of a problem are
-    used by the spanning-tree start alone.
+    iteration would be `rcd`. The certificate belongs to the rounded rotations. The terms
+    are weighted by the `confidence` of the edges.
 
     Y is dense, and an epoch costs n products of a sparse (3, 3n) by a dense (3n, 3n) matrix.
 
@@ -67,9 +70,9 @@ class BCD(Seeded):
         if self.init != "identity":
             columns = start_rotations(self.init, problem, rng).reshape(-1, 3)
             gram = MIX * gram + (1 - MIX) * columns @ columns.T
-        measurements = problem.block_matrix()
+        measurements = weighted_blocks(problem)
         rows = [measurements[3 * k : 3 * k + 3] for k in range(problem.n)]
-        cost = 6 * problem.m - float(measurements.multiply(gram).sum())
+        cost = 6 * float(confidence(problem).sum()) - float(measurements.multiply(gram).sum())
         reason, epochs = "epoch limit", 0
         while epochs < self.max_epochs:
             gain = sum(_improved(gram, row, k) for k, row in enumerate(rows))

@@ -15,12 +15,20 @@ from ._lib.graph.cemp import (
     inlier_weights,
     tree_of_least_corruption,
 )
-from ._lib.graph.triangles import sample_triangles
+from ._lib.graph.triangles import note_on_missing, sample_triangles
 from ._lib.linear.spectral import weighted_spectral
 from ._lib.warm_up import Warm
 
 
-@method("cemp", title="CEMP", cite="lerman2022", requires=("scipy", "numba"), robust=True, deterministic=False)
+@method(
+    "cemp",
+    title="CEMP",
+    cite="lerman2022",
+    requires=("scipy", "numba"),
+    robust=True,
+    simple_graph=True,
+    deterministic=False,
+)
 @dataclass(frozen=True)
 class CEMP(Warm):
     """Estimates how corrupted each edge is from the triangles over it alone, then solves with the good edges.
@@ -61,4 +69,10 @@ class CEMP(Warm):
             rotations = tree_of_least_corruption(problem, levels)
         else:
             rotations = weighted_spectral(problem, weights, triangles.missing)
-        return Estimate(rotations, edge_weights=weights, iterations=self.iterations, stop_reason="every iteration done")
+        return Estimate(
+            rotations,
+            edge_weights=weights,
+            iterations=self.iterations,
+            stop_reason="every iteration done",
+            notes=note_on_missing(triangles.missing, "nothing is known of how good they are"),
+        )

@@ -5,8 +5,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bench import Estimate, Floats, Problem, method, parameter
+from bench import Estimate, Floats, Ints, Problem, method, parameter
 
+from ._lib.graph.confidence import ranking
 from ._lib.stopwatch import Stopwatch
 
 
@@ -17,7 +18,10 @@ from ._lib.stopwatch import Stopwatch
     requires=("pycolmap",),
     install="python -m pip install 'pycolmap>=4'",
     robust=True,
-    invariant_to_deg=0.5,  # its iterations stop at a mean step of 1e-3 rad
+    uses=("weights", "precisions"),
+    simple_graph=True,
+    invariant_to_deg=None,  # without counts the order of the edges chooses the tree
+    depends_on_labels=True,
 )
 @dataclass(frozen=True)
 class Colmap:
@@ -28,8 +32,9 @@ class Colmap:
        1e-3.
 
     Source: the rotation averaging of GLOMAP (Pan et al. 2024), after Chatterjee and Govindu 2013, as it is
-    in COLMAP 4. The weights of a problem, where it has them, are the match counts; otherwise the edges count
-    alike, and the order of the edges decides between equal trees. COLMAP would drop edges and cameras after
+    in COLMAP 4. Weights, where there are any, are its match counts, by which it then multiplies the terms
+    as well (``reweighting=INLIER_MATCH_COUNT``); otherwise the edges count alike, and their order decides between
+    equal trees. COLMAP would drop edges and cameras after
     solving; that is off (``max_rotation_error_deg = 0``), so that every camera is kept.
 
     Parameters
@@ -56,7 +61,7 @@ class Colmap:
         conversion = Stopwatch()
         with conversion.running():
             reconstruction, graph = _reconstruction(problem.n), _pose_graph(problem)
-        options = self._options(seed=int(rng.integers(2**31)))
+        options = self._options(int(rng.integers(2**31)), weighted=ranking(problem) is not None)
         solved = pycolmap.run_rotation_averaging(options, graph, reconstruction, [])
         if not solved:
             raise RuntimeError(
@@ -67,7 +72,7 @@ class Colmap:
             rotations = _rotations(reconstruction, problem.n)
         return Estimate(rotations, stop_reason="COLMAP reported success", conversion_s=conversion.seconds)
 
-    def _options(self, seed: int) -> Any:
+    def _options(self, seed: int, *, weighted: bool) -> Any:
         import pycolmap
 
         options = pycolmap.RotationEstimatorOptions()
@@ -75,6 +80,8 @@ class Colmap:
         options.irls_loss_parameter_sigma = self.sigma_deg
         options.weight_type = getattr(pycolmap.RotationWeightType, self.weight_type.upper().replace("-", "_"))
         options.random_seed = seed
+        if weighted:
+            options.reweighting = pycolmap.RotationAveragingReweighting.INLIER_MATCH_COUNT
         return options
 
 
@@ -90,13 +97,20 @@ def _reconstruction(n: int) -> Any:
     return reconstruction
 
 
+def _matches(problem: Problem) -> Ints:
+    """(m,) numbers of matches; of weights that are none, whole numbers in proportion, 1000 on average."""
+    given = problem.weights if problem.weights_kind == "count" else None
+    relative = ranking(problem)
+    if relative is None:
+        return np.ones(problem.m, dtype=np.int32)
+    return np.maximum(np.rint(1000 * relative if given is None else given), 1).astype(np.int32)
+
+
 def _pose_graph(problem: Problem) -> Any:
     """COLMAP's cam2_from_cam1 of an edge (i, j) is R_j R_i^T, the transpose of R_ij."""
     import pycolmap
 
-    matches = (
-        np.ones(problem.m, int) if problem.weights is None else np.maximum(np.rint(problem.weights), 1).astype(int)
-    )
+    matches = _matches(problem)
     graph = pycolmap.PoseGraph()
     for (i, j), rotation, count in zip(problem.edges.tolist(), problem.rotations, matches.tolist(), strict=True):
         relative = pycolmap.Rigid3d(pycolmap.Rotation3d(np.ascontiguousarray(rotation.T)), np.zeros(3))

@@ -1,6 +1,6 @@
 """DESC: corruption levels by quadratic programming over triangles."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -10,14 +10,22 @@ from bench import Estimate, Floats, Problem, method, parameter
 from ._lib.descent.cycle_refinement import refined
 from ._lib.descent.simplex_descent import consistent_levels
 from ._lib.graph.cemp import inlier_weights
-from ._lib.graph.triangles import codegrees, sample_triangles
+from ._lib.graph.triangles import codegrees, note_on_missing, sample_triangles
 from ._lib.linear.spectral import weighted_spectral
 from ._lib.starts import Refined, Start, start_rotations
 
 FEWEST_TRIANGLES = 30
 
 
-@method("desc", title="DESC", cite="shi2022", requires=("scipy", "numba"), robust=True)
+@method(
+    "desc",
+    title="DESC",
+    cite="shi2022",
+    requires=("scipy", "numba"),
+    robust=True,
+    simple_graph=True,
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class DESC(Refined):
     """Minimises sum_ij sum_k w_ij,k (s_ik + s_jk), with s_ij = sum_k w_ij,k d_ij,k, for the corruption s of the edges.
@@ -35,8 +43,8 @@ class DESC(Refined):
     question), and the descent makes all its steps (theirs may stop when the objective stalls); an edge in no triangle
     counts with the median weight in step 3 and with its residual alone in step 4; weights of the blocks are kept above
     1e-4, and those of least squares above 1e-10 of the largest (there 1e-8, absolute); residuals are those of the moved
-    cameras, and the mean step is removed instead of anchoring a camera. The weights of a problem are not used, except
-    by the spanning-tree start.
+    cameras, and the mean step is removed instead of anchoring a camera. The weights of step 4
+    are multiplied by the `confidence` of the edges.
 
     Parameters
     ----------
@@ -71,7 +79,8 @@ class DESC(Refined):
         def by_cycles(residuals: Floats) -> Floats:
             return np.where(triangles.missing, residuals, levels)
 
-        return refined(problem, start, levels, by_cycles, self.tolerance_deg, self.iterations)
+        found = refined(problem, start, levels, by_cycles, self.tolerance_deg, self.iterations)
+        return replace(found, notes=note_on_missing(triangles.missing, "their residuals alone weigh them"))
 
 
 def _quarter_of_the_median(problem: Problem) -> int:

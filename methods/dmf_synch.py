@@ -9,11 +9,12 @@ import numpy as np
 from bench import Checkpoint, Estimate, Floats, Problem, method, parameter
 
 from ._lib.dmf import dmf_dense, dmf_thin
-from ._lib.dmf.dmf_thin import Factors, Loss, Observed, Report, chordal
+from ._lib.dmf.dmf_thin import Factors, Loss, Observed, Report, Single, chordal
 from ._lib.dmf.presets import Presets
-from ._lib.linear.rounding import nearest_rotations
+from ._lib.graph.confidence import confidence, ranking, strengths
+from ._lib.linear.rounding import nearest_rotations, note_on_mirrored
 from ._lib.linear.spectral import spectral_rotations
-from ._lib.starts import SEEDED, Start, start_rotations
+from ._lib.starts import SEEDED, Start, resolved, start_rotations
 from ._lib.warm_up import solved_once
 
 START_TOLERANCE = 1e-3  # radians; the descent moves further than that
@@ -101,7 +102,7 @@ class DMFSynch(Presets):
         Iterations between two checkpoints. None: 100 for thin, 1,000 for paper, 250 for dense, where the misfit is
         looked at as often.
     init
-        Of thin: where to start, see `start_rotations`, but for "spectral" (the default), see `spectral_start`, and
+        Of thin: where to start, see `start_rotations`, but for "spectral", see `spectral_start`, and
         "random", see above.
     smoothing_deg
         Of thin: the last s, 0.3 degrees for "l1/2" and 0.03 for "l1" unless given.
@@ -138,6 +139,16 @@ class DMFSynch(Presets):
         return self.depth or (5 if self.preset == "paper" else 3)
 
     @property
+    def uses(self) -> tuple[str, ...]:
+        """The terms of the thin form are weighted by the `confidence` of the edges."""
+        return ("weights", "precisions") if self.preset == "thin" else ()
+
+    @property
+    def simple_graph(self) -> bool:
+        """The dense form has one block for each pair."""
+        return self.preset != "thin"
+
+    @property
     def deterministic(self) -> bool:
         """The thin form draws nothing unless it starts at random or is wider than three."""
         return self.preset == "thin" and self.init not in SEEDED and (self.width or 3) == 3
@@ -151,10 +162,8 @@ class DMFSynch(Presets):
 
     @property
     def invariant_to_deg(self) -> float | None:
-        """The entry-wise l1 loss depends on the frames of the cameras, as the dense form does on its random start."""
-        if self.preset != "thin":
-            return 2.0
-        if self.init == "random":
+        """The entry-wise l1 loss depends on the frames of the cameras; a random start is drawn by label."""
+        if self.preset != "thin" or self.init == "random":
             return None
         return 1.0 if self.loss == "l1" else 0.01
 
@@ -183,13 +192,14 @@ class DMFSynch(Presets):
                 checkpoints.append(Checkpoint(iteration, seconds, found, {"cost": cost, **diagnostics}))
 
         iterations = self.iterations or 500
-        cost = self._descend(observed, factors, self.lr or 0.05, iterations, report)
+        cost = self._descend(observed, factors, self.lr or 0.05, iterations, _blocks(problem, observed), report)
         return Estimate(
             rotations()[0],
             iterations=iterations,
             stop_reason="end of the step-size schedule",
             cost=cost,
             checkpoints=tuple(checkpoints),
+            notes=note_on_mirrored(factors.eigenpairs()[1][:, :3]),
         )
 
     def _start(
@@ -201,10 +211,12 @@ class DMFSynch(Presets):
             wide = min(max(WIDE, width), 3 * problem.n)
             columns = rng.standard_normal((3 * problem.n, wide)) / np.sqrt(wide)
             factors = Factors.balanced(*_eigenpairs(columns * scale), self.layers)
-            self._descend(observed, factors, WIDE_LR * (self.lr or 0.05), self.iterations or 500)
+            self._descend(
+                observed, factors, WIDE_LR * (self.lr or 0.05), self.iterations or 500, _blocks(problem, observed)
+            )
             values, vectors = factors.eigenpairs()
             return values[:width], vectors[:, :width]
-        init = self.init or "spectral"
+        init = resolved(self.init or "auto", problem)
         rotations = spectral_start(problem) if init == "spectral" else start_rotations(init, problem, rng)
         extra = EXTRA * rng.standard_normal((3 * problem.n, width - 3))
         return _eigenpairs(np.hstack([rotations.reshape(-1, 3), extra]) * scale)
@@ -215,6 +227,7 @@ class DMFSynch(Presets):
         factors: Factors,
         lr: float,
         iterations: int,
+        weights: Single | None,
         report: Report | None = None,
     ) -> float:
         loss: Loss = self.loss or "l1/2"
@@ -228,6 +241,7 @@ class DMFSynch(Presets):
             iterations=iterations,
             smoothing=(max(chordal(FIRST_SMOOTHING_DEG), last), last),
             report=report,
+            weights=weights,
         )
 
     def _solve_dense(self, problem: Problem, rng: np.random.Generator) -> Estimate:
@@ -260,18 +274,26 @@ class DMFSynch(Presets):
         return _picked(checkpoints, by_misfit)
 
 
+def _blocks(problem: Problem, observed: Observed) -> Single | None:
+    """Weights (k,) of the observed blocks, if they differ."""
+    trust = ranking(problem)
+    return None if trust is None else observed.weigh(trust)
+
+
 def spectral_start(problem: Problem) -> Floats:
     """The one of two spectral solutions (n, 3, 3) whose mean residual angle is smaller.
 
-    One is divided by the degrees. Where many cameras have few measurements, outliers on these mislead it; the other is
-    divided by the degrees plus their mean (as Amini et al. 2013 do for communities), but fades out along trajectories.
+    Blocks are weighted by the `confidence` of their edges. One is divided by the degrees. Where many cameras have few
+    measurements, outliers on these mislead it; the other is divided by the degrees plus their mean (as Amini et al.
+    2013 do for communities), but fades out along trajectories.
     """
-    regularised = 1 / np.sqrt((problem.degree + problem.degree.mean())[problem.edges].prod(axis=1))
+    trust, degree = confidence(problem), strengths(problem)
+    regularised = trust / np.sqrt((degree + degree.mean())[problem.edges].prod(axis=1))
     candidates = [
-        spectral_rotations(problem, tolerance=START_TOLERANCE)[0],
+        spectral_rotations(problem, trust, tolerance=START_TOLERANCE)[0],
         spectral_rotations(problem, regularised, normalised=False, tolerance=START_TOLERANCE)[0],
     ]
-    return min(candidates, key=lambda rotations: float(problem.residuals(rotations).mean()))
+    return min(candidates, key=lambda rotations: float((trust * problem.residuals(rotations)).mean()))
 
 
 def outliers_are_being_fitted(checkpoints: list[Checkpoint]) -> bool:

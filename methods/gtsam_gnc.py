@@ -8,6 +8,7 @@ import numpy as np
 from bench import Estimate, Problem, method, parameter
 
 from ._lib.descent.surrogates import SURROGATES, GncLoss
+from ._lib.graph.confidence import confidence
 from ._lib.gtsam_values import rotations_of, values_of
 from ._lib.starts import Start, Started, start_rotations
 from ._lib.stopwatch import Stopwatch
@@ -16,7 +17,15 @@ PRIOR_SIGMA = 1.0  # any; a prior on one camera fixes the gauge and costs nothin
 INLIER_COST = 0.5  # GTSAM's cost of a residual at the threshold
 
 
-@method("gtsam-gnc", title="GNC (GTSAM)", cite="yang2020", requires=("gtsam", "scipy", "numba"), robust=True)
+@method(
+    "gtsam-gnc",
+    title="GNC (GTSAM)",
+    cite="yang2020",
+    requires=("gtsam", "scipy", "numba"),
+    robust=True,
+    depends_on_labels=True,
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class GtsamGNC(Started):
     """Minimises the costs of `gnc`, each weighted problem by Levenberg-Marquardt.
@@ -31,10 +40,11 @@ class GtsamGNC(Started):
     Source: Yang, Antonante, Tzoumas and Carlone, RA-L 2020; GTSAM's GncOptimizer with its defaults.
     Deviations: `init`; the inner optimization ends by the relative decrease of its cost alone, because
     GTSAM's absolute limit stops small problems early. Nothing keeps a camera whose edges are all rejected
-    from staying where it started. The weights of a problem are used by the spanning-tree start alone.
+    from staying where it started.
 
     GTSAM's keys are camera-to-world rotations S_i = R_i^T with measurements S_i^T S_j, which is R_ij as it
-    stands; its residual is the rotation vector, in units of the threshold here.
+    stands; its residual is the rotation vector, in units of the threshold divided by the
+    root of the `confidence` of the edge: where `gnc` multiplies the loss, GTSAM knows only this way.
 
     Parameters
     ----------
@@ -48,15 +58,13 @@ class GtsamGNC(Started):
 
     loss: GncLoss = "tls"
     threshold_deg: float = parameter(5.0, above=0)
-    init: Start = "spectral"
+    init: Start = "auto"
     tolerance: float = parameter(1e-5, above=0)
 
     @property
     def invariant_to_deg(self) -> float | None:
-        """GTSAM ends as soon as its cost changes little, which with Geman-McClure is early."""
-        if self.init == "random":
-            return None
-        return 0.1 if self.loss == "geman-mcclure" else 1e-3
+        """None: a camera whose edges are all rejected stays where damping and elimination, by label, have left it."""
+        return None
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         import gtsam
@@ -73,10 +81,10 @@ class GtsamGNC(Started):
         with conversion.running():
             rotations = rotations_of(values, problem.n)
             weights = np.array(optimizer.getWeights())[: problem.m]
-        cost = SURROGATES[self.loss].cost((problem.residuals(rotations) / threshold) ** 2).sum()
+        cost = SURROGATES[self.loss].cost(confidence(problem) * (problem.residuals(rotations) / threshold) ** 2).sum()
         return Estimate(
             rotations,
-            edge_weights=weights,
+            edge_weights=confidence(problem) * weights,
             stop_reason="GTSAM does not tell",
             cost=float(cost),
             conversion_s=conversion.seconds,
@@ -99,8 +107,9 @@ def _graph(problem: Problem, start: Any, threshold: float) -> Any:
     import gtsam
 
     graph = gtsam.NonlinearFactorGraph()
-    noise = gtsam.noiseModel.Isotropic.Sigma(3, threshold)
-    for (i, j), rotation in zip(problem.edges.tolist(), problem.rotations, strict=True):
+    sigmas = (threshold / np.sqrt(confidence(problem))).tolist()
+    for (i, j), rotation, sigma in zip(problem.edges.tolist(), problem.rotations, sigmas, strict=True):
+        noise = gtsam.noiseModel.Isotropic.Sigma(3, sigma)
         graph.add(gtsam.BetweenFactorRot3(i, j, gtsam.Rot3(rotation), noise))
     gauge = gtsam.noiseModel.Isotropic.Sigma(3, PRIOR_SIGMA)
     graph.add(gtsam.PriorFactorRot3(0, start.atRot3(0), gauge))

@@ -10,8 +10,11 @@ from bench import Estimate, Floats, Problem, method, parameter, so3
 from ._lib.descent.descent import Descent
 from ._lib.descent.losses import LOSSES
 from ._lib.graph.all_triangles import AllTriangles
+from ._lib.graph.confidence import confidence
 from ._lib.graph.hierarchical_tree import hierarchical_tree, support_levels
+from ._lib.graph.restricted import restricted
 from ._lib.graph.trees import tree_edges
+from ._lib.graph.triangles import note_on_missing
 from ._lib.warm_up import Warm
 
 QUANTILES = (0.1, 0.2, 0.3)
@@ -19,7 +22,15 @@ USUAL_ERROR = 1.0  # squared Frobenius norm, 41.4 degrees; larger loop errors te
 ROUNDING = 1e-12  # of a squared Frobenius norm
 
 
-@method("hara", title="HARA", cite="lee2022", requires=("scipy", "numba"), robust=True)
+@method(
+    "hara",
+    title="HARA",
+    cite="lee2022",
+    requires=("scipy", "numba"),
+    robust=True,
+    simple_graph=True,
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class HARA(Warm):
     """Minimises sum_ij sqrt(angle(R_i^T R_ij R_j)) over the edges that agree with a carefully grown spanning tree.
@@ -41,7 +52,7 @@ class HARA(Warm):
     by 7 to 9 %), so that nothing is random; an edge's triangles are all counted, and once, where the paper looks for
     them as the tree grows; which of support and threshold is relaxed first is our reading: the threshold; the single
     rotation averaging is iterated on rotations; edges that the filter removes but that alone connect some camera are
-    kept, those of smallest angle, and noted. The weights of a problem are not used.
+    kept, those of smallest angle, and noted; in step 4 the terms are weighted by the `confidence` of the edges.
 
     Parameters
     ----------
@@ -66,7 +77,9 @@ class HARA(Warm):
         thresholds = np.maximum(np.quantile(usual, QUANTILES), ROUNDING) if len(usual) else np.zeros(0)
         levels = support_levels(problem, triangles, thresholds, self.support)
         tree = hierarchical_tree(problem, levels, self.support * len(thresholds))
-        notes = [f"{tree.averaged} cameras without triplet support were averaged"] if tree.averaged else []
+        notes = [*note_on_missing(triangles.missing(problem.m), "no triplet supports them")]
+        if tree.averaged:
+            notes.append(f"{tree.averaged} cameras without triplet support were averaged")
         kept = np.ones(problem.m, dtype=np.bool_)
         if len(triangles.errors) and np.median(triangles.errors) > USUAL_ERROR:
             notes.append("no edge was filtered: most triangles are far from closing")
@@ -81,27 +94,27 @@ class HARA(Warm):
 
     def _refined(self, problem: Problem, start: Floats, kept: NDArray[np.bool_], notes: tuple[str, ...]) -> Estimate:
         loss = LOSSES["l-half"]
-        filtered = Problem(problem.n, problem.edges[kept], problem.rotations[kept])
+        filtered = restricted(problem, kept)
         descent = Descent(filtered, start, np.radians(self.tolerance_deg))
         converged = False
         if self.irls_iterations:
-            descent.step(np.ones(filtered.m))
+            descent.step(confidence(filtered))
             converged = descent.reweight(loss, 1.0, self.irls_iterations)
         weights = np.zeros(problem.m)
-        weights[kept] = loss.weight(descent.angles)
+        weights[kept] = descent.weights(loss, 1.0)
         return Estimate(
             so3.from_quaternion(descent.cameras),
             edge_weights=weights,
             iterations=descent.iterations,
             stop_reason=f"mean step below {self.tolerance_deg:g} degrees" if converged else "iteration limit",
-            cost=float(loss.value(descent.angles).sum()),
+            cost=float((confidence(filtered) * loss.value(descent.angles)).sum()),
             notes=notes,
         )
 
 
 def _connecting(problem: Problem, residuals: Floats, kept: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Edges (k,) outside `kept` (m,), of the smallest residuals, that a connected graph needs beside those."""
-    if Problem(problem.n, problem.edges[kept], problem.rotations[kept]).components.max() == 0:
+    if restricted(problem, kept).components.max() == 0:
         return np.zeros(0, dtype=np.intp)
     tree = tree_edges(problem, 1 / (1 + residuals))
     return tree[~kept[tree]]

@@ -7,7 +7,14 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, method, parameter, so3
 
-from ._lib.linear.certificate import certificate_matrix, chordal_cost, multipliers, smallest_eigenvalue
+from ._lib.graph.confidence import confidence, strengths
+from ._lib.linear.certificate import (
+    certificate_matrix,
+    chordal_cost,
+    multipliers,
+    smallest_eigenvalue,
+    weighted_blocks,
+)
 from ._lib.linear.eigen import smallest
 from ._lib.linear.rounding import nearest_rotations
 from ._lib.starts import Seeded, Start, start_rotations
@@ -21,7 +28,14 @@ ANGLE = 1e-6  # radians between the eigenvectors found and the true ones; values
 ROUNDING = 1e-12  # of the gap, for each edge
 
 
-@method("maks", title="MAKS", cite="moreira2021", requires=("scipy", "numba"), certifies=True)
+@method(
+    "maks",
+    title="MAKS",
+    cite="moreira2021",
+    requires=("scipy", "numba"),
+    certifies=True,
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class MAKS(Seeded):
     """Minimises the sum of squared chordal residuals by eigenvectors of Lambda - G, Lambda the multipliers.
@@ -44,7 +58,8 @@ class MAKS(Seeded):
       found see `smallest` (theirs: Krylov-Schur iterations on a shifted factorization).
     - The estimate is the R of lowest cost, not the last; no camera is turned to the identity.
 
-    The weights of a problem are used by the spanning-tree start alone.
+    The terms are weighted by the `confidence` of the edges: R_ij stands for w_ij R_ij in G and in step 3, and degrees
+    are sums of the w.
 
     Parameters
     ----------
@@ -64,11 +79,17 @@ class MAKS(Seeded):
     tolerance: float = parameter(1e-8, at_least=0)
     max_iterations: int = parameter(50, at_least=1)
 
+    @property
+    def invariant_to_deg(self) -> float | None:
+        """From a poor start it may not have converged at the iteration limit."""
+        return 1e-3 if self.init in ("degrees", "spectral") else None
+
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
-        measurements = problem.block_matrix()
+        measurements = weighted_blocks(problem)
+        most = 6 * float(confidence(problem).sum())
         noise = SPREAD * np.random.default_rng(0).standard_normal((3 * problem.n, 3))
         if self.init == "degrees":
-            dual, columns = problem.degree[:, None, None] * np.eye(3), noise
+            dual, columns = strengths(problem)[:, None, None] * np.eye(3), noise
         else:
             first = start_rotations(self.init, problem, rng)
             dual, columns = self._updated(measurements, first), first.reshape(-1, 3) + noise
@@ -80,7 +101,7 @@ class MAKS(Seeded):
             cost = chordal_cost(problem, rotations)
             if cost < lowest:
                 best, lowest = rotations, cost
-            bound = 6 * problem.m - np.trace(dual, axis1=1, axis2=2).sum() + 3 * problem.n * found.values[0]
+            bound = most - np.trace(dual, axis1=1, axis2=2).sum() + 3 * problem.n * found.values[0]
             if lowest - bound <= max(self.tolerance * lowest, ROUNDING * problem.m):
                 reason = f"gap below {self.tolerance:g} of the cost"
                 break

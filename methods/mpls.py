@@ -1,6 +1,6 @@
 """MPLS: message passing least squares."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,13 +8,21 @@ from bench import Estimate, Floats, Problem, method, parameter
 
 from ._lib.descent.cycle_refinement import refined
 from ._lib.graph.cemp import ITERATIONS, TRIANGLES, corruption_levels, tree_of_least_corruption
-from ._lib.graph.triangles import sample_triangles
+from ._lib.graph.triangles import note_on_missing, sample_triangles
 from ._lib.starts import Refined, Start, start_rotations
 
 BETA = 32.0
 
 
-@method("mpls", title="MPLS", cite="shi2020", requires=("scipy", "numba"), robust=True)
+@method(
+    "mpls",
+    title="MPLS",
+    cite="shi2020",
+    requires=("scipy", "numba"),
+    robust=True,
+    simple_graph=True,
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class MPLS(Refined):
     """Least squares whose weights come from the residuals of edges and, by message passing, of their triangles.
@@ -29,7 +37,7 @@ class MPLS(Refined):
     Source: Shi and Lerman, ICML 2020, algorithm 2, with the settings of its section 4. Deviations: triangles are
     drawn without replacement; h of an edge in no triangle is its residual; weights are kept above 1e-10 of the largest
     (there 1e-8, absolute); residuals are those of the moved cameras, and the mean step is removed instead of anchoring
-    a camera. The weights of a problem are not used, except by the spanning-tree start.
+    a camera; the weights are multiplied by the `confidence` of the edges.
 
     Parameters
     ----------
@@ -59,4 +67,5 @@ class MPLS(Refined):
         def by_cycles(residuals: Floats) -> Floats:
             return np.where(triangles.missing, residuals, triangles.weighted_means(np.exp(-BETA * residuals)))
 
-        return refined(problem, start, levels, by_cycles, self.tolerance_deg, self.iterations)
+        found = refined(problem, start, levels, by_cycles, self.tolerance_deg, self.iterations)
+        return replace(found, notes=note_on_missing(triangles.missing, "their residuals alone weigh them"))

@@ -22,6 +22,7 @@ ENTRY_STEP = 0.2  # threshold of an entry of E in one iteration, which sets the 
     cite="candes2011",
     requires=("scipy", "numba"),
     robust=True,
+    simple_graph=True,  # X has one block for each pair
     max_cameras=500,
     invariant_to_deg=2.0,  # entrywise misfits: what turning the frames does to two degrees of noise
 )
@@ -48,7 +49,7 @@ class NuclearNorm(Seeded):
     that up to strength 1/2 it does not pay to fit noise by singular values. The penalty is constant, 5 lambda, where
     theirs grows. Above 60 cameras singular values above 1 / mu are found by two steps of subspace
     iteration from the last ones, with ten columns to spare: exact only in the limit, as the iterates settle.
-    The weights of a problem are used by the spanning-tree start alone.
+    The weights of a problem are not used.
 
     Misfits are those of single entries, as in the source and in `dmf-synch`, so that the answer depends a little on the
     frames of the cameras. All matrices are dense: half a minute at 500 cameras, which is what it is meant for at most.

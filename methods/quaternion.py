@@ -6,6 +6,7 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, method, parameter, so3
 
+from ._lib.graph.confidence import confidence
 from ._lib.linear.eigen import PRECISE, Eigenspace, smallest
 from ._lib.linear.laplacian import block_laplacian
 from ._lib.starts import Start, Started, start_rotations
@@ -21,24 +22,31 @@ for _axis in range(1, 4):
     PRODUCT[0, _axis, _axis] = PRODUCT[_axis, _last, _next] = -1
 
 
-@method("quaternion", title="Quaternion least squares", cite="govindu2001", requires=("scipy", "numba"))
+@method(
+    "quaternion",
+    title="Quaternion least squares",
+    cite="govindu2001",
+    requires=("scipy", "numba"),
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class Quaternion(Started):
-    """Minimises sum_ij |s_ij q_ij q_j - q_i|^2 over quaternions q_i of unit norm in total and signs s_ij.
+    """Minimises sum_ij w_ij |s_ij q_ij q_j - q_i|^2 over quaternions of unit norm in total and signs s_ij.
+
+    The w_ij are the `confidence` of the edges.
 
     1. A rotation is two quaternions, q and -q, and the equations q_i = s_ij q_ij q_j are linear only once the signs
        are known: take those that fit the rotations of `init` better.
     2. Solve the homogeneous system in the least squares sense: a right singular vector of the smallest singular
-       value, found as an eigenvector of the normal matrix, the graph Laplacian with -s_ij q_ij (as the 4 x 4 matrix
-       that multiplies from the left) in block (i, j). Multiplying all q_i from the right by one quaternion changes no
-       residual: the value has multiplicity four, and all of its vectors are the same answer in another gauge.
+       value, found as an eigenvector of the normal matrix, the graph Laplacian with -w_ij s_ij q_ij (as the 4 x 4
+       matrix that multiplies from the left) in block (i, j). Multiplying all q_i from the right by one quaternion
+       changes no residual: the value has multiplicity four, and all of its vectors are one answer in other gauges.
     3. Choose the signs anew by the solution and solve again, until no sign changes. No step increases the sum.
     4. Divide every q_i by its norm.
 
     Source: Govindu, CVPR 2001 (the linear system). Deviations: the choice of signs, steps 1 and 3, is ours; with
     ``sweeps=1`` they are those of the start. Eigenvectors are found by LAPACK up to 100
-    cameras, else by block Davidson iterations (see `smallest`). The weights of a problem are used by the
-    spanning-tree start alone.
+    cameras, else by block Davidson iterations (see `smallest`).
 
     As in `martinec-pajdla`, nothing bounds the norm of a single q_i, and a camera with few, contradicting measurements
     may take most of it.
@@ -68,7 +76,8 @@ class Quaternion(Started):
         stop_reason = "sweep limit" if changed else "no sign changes"
         i, j = problem.edges.T
         cameras = cameras / np.linalg.norm(cameras, axis=1, keepdims=True)
-        cost = float(np.sum((_multiplied(signed, cameras[j]) - cameras[i]) ** 2))
+        misfits = (_multiplied(signed, cameras[j]) - cameras[i]) ** 2
+        cost = float(np.sum(confidence(problem)[:, None] * misfits))
         notes = () if found.error <= PRECISE else (f"eigenvectors known to {np.degrees(found.error):.1e} degrees only",)
         return Estimate(so3.from_quaternion(cameras), iterations=sweep, stop_reason=stop_reason, cost=cost, notes=notes)
 

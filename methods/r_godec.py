@@ -22,6 +22,7 @@ NOISE = 0.02  # deviation of the entries of the measured rotations that the publ
     cite="arrigoni2018",
     requires=("scipy", "numba"),
     robust=True,
+    simple_graph=True,  # X has one block for each pair
     exact_to_deg=0.2,  # a hundred iterations do not complete a tree
     invariant_to_deg=0.01,  # entrywise thresholds
 )
@@ -47,8 +48,7 @@ class RGoDec(Seeded):
     the eigenvectors, not from the block column of one camera. The completed matrix is L plus the measured residuals
     clipped to [-lambda, lambda], of which only the measured blocks are computed: nothing is (3n, 3n), and an
     iteration costs time proportional to the number of edges. It is a gradient step of length one on an entrywise Huber
-    loss, and the less is measured, the slower it is. The weights of a problem are used by the spanning-tree
-    start alone.
+    loss, and the less is measured, the slower it is. The weights of a problem are not used.
 
     Parameters
     ----------
@@ -71,17 +71,21 @@ class RGoDec(Seeded):
         threshold = self.threshold or NOISE * float(np.sqrt(2 * np.log(18 * problem.m)))
         fitted = model(problem, self.init, threshold, rng)
         size = np.sqrt(3 * (2 * problem.m + problem.n))
-        stop_reason = "iteration limit"
+        stop_reason, notes = "iteration limit", tuple[str, ...]()
         for iteration in range(1, self.iterations + 1):  # noqa: B007 - reported below
-            if fitted.step() <= self.tolerance * size:
+            moved = fitted.step() / size
+            if moved <= self.tolerance:
                 stop_reason = f"L changed by less than {self.tolerance:g}"
                 break
+        else:
+            notes = (f"not converged: L still changed by {moved:.1e} in the last of {iteration} iterations",)
         return Estimate(
             fitted.rotations(),
             edge_weights=fitted.edge_weights(),
             iterations=iteration,
             stop_reason=stop_reason,
             cost=fitted.cost(),
+            notes=notes,
         )
 
 

@@ -8,19 +8,29 @@ from bench import Estimate, Floats, Problem, method, parameter
 
 from ._lib.descent.iterate import Iterate, floored, mean_norm
 from ._lib.descent.losses import LOSSES, LossName
+from ._lib.graph.confidence import confidence
 from ._lib.linear.laplacian import LaplacianSolver
 from ._lib.starts import Start, Started, start_rotations
 
 FIRST_DAMPING, SMALLEST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-8, 1e8  # of the weight of the edges of each camera
 
 
-@method("robust-lm", title="Robust LM", cite="crandall2011", requires=("scipy", "numba"), robust=True)
+@method(
+    "robust-lm",
+    title="Robust LM",
+    cite="crandall2011",
+    requires=("scipy", "numba"),
+    robust=True,
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class RobustLM(Started):
-    """Minimises sum_ij loss(angle(R_i R_j^T, R_ij)) by damped steps that never raise it.
+    """Minimises sum_ij c_ij loss(angle(R_i R_j^T, R_ij)) by damped steps that never raise it.
+
+    The c_ij are the `confidence` of the edges.
 
     1. Start from `init`.
-    2. With b_ij = log(R_i^T R_ij R_j) and w_ij = loss'(|b_ij|) / |b_ij|, minimise over x the sum of
+    2. With b_ij = log(R_i^T R_ij R_j) and w_ij = c_ij loss'(|b_ij|) / |b_ij|, minimise over x the sum of
        w_ij |x_i - x_j - b_ij|^2 and of damping d_i |x_i|^2, d_i being the sum of the weights of camera i:
        one factorization of a weighted Laplacian plus a diagonal.
     3. Move R_i <- R_i exp(x_i) if that lowers the cost, and set the damping from the ratio of the decrease
@@ -33,8 +43,7 @@ class RobustLM(Started):
     Source: Crandall, Owens, Snavely and Huttenlocher, CVPR 2011: the continuous refinement. Deviations: what
     precedes it there, discrete belief propagation, is replaced by `init`; the derivative of log is taken as
     the identity, which leaves the gradient exact, decouples the three coordinates and never underestimates
-    the curvature; a truncated quadratic is ``talwar``. The weights of a problem are used by the
-    spanning-tree start alone.
+    the curvature; a truncated quadratic is ``talwar``.
 
     Parameters
     ----------
@@ -50,7 +59,7 @@ class RobustLM(Started):
 
     loss: LossName = "geman-mcclure"
     sigma_deg: float = parameter(5.0, above=0)
-    init: Start = "spectral"
+    init: Start = "auto"
     iterations: int = parameter(200, at_least=0)
     tolerance_deg: float = parameter(1e-3, above=0)
 
@@ -58,15 +67,16 @@ class RobustLM(Started):
         loss, scale = LOSSES[self.loss], LOSSES[self.loss].scale(np.radians(self.sigma_deg))
         system = _DampedSystem(problem)
         here = Iterate.at(problem, start_rotations(self.init, problem, rng))
-        cost = float(loss.value(here.angles / scale).sum())
+        trust = confidence(problem)
+        cost = float((trust * loss.value(here.angles / scale)).sum())
         damping, raise_by = FIRST_DAMPING, 2.0
         reason, done = "iteration limit", 0
         while done < self.iterations:
-            weights = floored(loss.weight(here.angles / scale))
+            weights = floored(trust * loss.weight(here.angles / scale))
             steps, promised = system.solve(weights, damping, here.vectors / scale)
             steps *= scale
             there = here.turned(steps)
-            there_cost = float(loss.value(there.angles / scale).sum())
+            there_cost = float((trust * loss.value(there.angles / scale)).sum())
             done += 1
             if there_cost < cost:
                 ratio = (cost - there_cost) / promised
@@ -82,7 +92,7 @@ class RobustLM(Started):
                 break
         return Estimate(
             here.rotations,
-            edge_weights=loss.weight(here.angles / scale),
+            edge_weights=trust * loss.weight(here.angles / scale),
             iterations=done,
             stop_reason=reason,
             cost=cost,

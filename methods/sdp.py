@@ -8,7 +8,8 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, method, parameter
 
-from ._lib.linear.certificate import chordal_cost, multipliers, smallest_eigenvalue
+from ._lib.graph.confidence import confidence
+from ._lib.linear.certificate import chordal_cost, multipliers, smallest_eigenvalue, weighted_blocks
 from ._lib.linear.rounding import rounded
 from ._lib.linear.spectral import spectral_rotations
 from ._lib.warm_up import Warm
@@ -28,13 +29,14 @@ SCS_SCALE = 10.0
     requires=("cvxpy", "scs", "scipy", "numba"),
     certifies=True,
     max_cameras=300,
+    uses=("weights", "precisions"),
 )
 @dataclass(frozen=True)
 class SDP(Warm):
     """Minimises the sum of squared chordal residuals, with R R^T relaxed to a positive semidefinite matrix.
 
     1. Maximise tr(G X) over positive semidefinite X (3n, 3n) with identities as diagonal blocks; G holds
-       R_ij in block (i, j). What the solver gets is the dual: minimise tr(Lambda) over block-diagonal Lambda
+       R_ij, weighted, in block (i, j). What the solver gets is the dual: minimise tr(Lambda) over block-diagonal Lambda
        with Lambda - G positive semidefinite. It has 6n unknowns instead of 9n^2 / 2, and X is the multiplier
        of its one constraint.
     2. SCS starts from the spectral solution: X = R R^T, Lambda from the stationarity condition.
@@ -43,7 +45,7 @@ class SDP(Warm):
 
     Source: Arie-Nachimson et al. 2012, section 4 (the relaxation of Singer 2011 for SO(3)). Deviations: the
     dual form and the start, which change the time and not the optimum. The certificate belongs to the
-    rounded rotations. The weights of a problem are not used.
+    rounded rotations. The terms are weighted by the `confidence` of the edges.
 
     One SCS iteration is one eigendecomposition of a dense (3n, 3n) matrix. On one core the 227
     cameras of Ellis Island take half a minute, and a graph of 394 cameras took more than four.
@@ -114,7 +116,7 @@ def _dual(problem: Problem) -> "cvxpy.Problem":
     spread = sparse.csr_array((np.ones(len(places)), (places, columns)), shape=(size**2, 6 * problem.n))
     triangles = cvxpy.Variable(6 * problem.n)
     blocks = cvxpy.reshape(spread @ triangles, (size, size), order="F")
-    measurements = problem.block_matrix() / problem.degree.mean()
+    measurements = weighted_blocks(problem) / problem.degree.mean()
     return cvxpy.Problem(cvxpy.Minimize(cvxpy.sum(triangles[np.flatnonzero(~mirrored)])), [blocks - measurements >> 0])
 
 
@@ -133,9 +135,9 @@ def _solve_from_spectral(relaxation: "cvxpy.Problem", problem: Problem, eps: flo
         scale=SCS_SCALE,
         verbose=False,
     )
-    rotations = spectral_rotations(problem)[0]
+    rotations = spectral_rotations(problem, confidence(problem))[0]
     row, col = np.tril_indices(3)
-    triangles = (multipliers(problem.block_matrix(), rotations) / problem.degree.mean())[:, row, col].ravel()
+    triangles = (multipliers(weighted_blocks(problem), rotations) / problem.degree.mean())[:, row, col].ravel()
     stacked = rotations.reshape(-1, 3)
     solution = solver.solve(
         warm_start=True,

@@ -7,8 +7,9 @@ import numpy as np
 
 from bench import Estimate, Problem, method, parameter
 
+from ._lib.graph.confidence import confidence
 from ._lib.gtsam_values import rotations_of, values_of
-from ._lib.linear.certificate import chordal_cost, smallest_eigenvalue
+from ._lib.linear.certificate import certified, chordal_cost, smallest_eigenvalue
 from ._lib.linear.spectral import spectral_rotations
 from ._lib.stopwatch import Stopwatch
 from ._lib.warm_up import Warm
@@ -16,7 +17,15 @@ from ._lib.warm_up import Warm
 HUBER = 1.345  # GTSAM's threshold, in units of sigma
 
 
-@method("shonan", title="Shonan", cite="dellaert2020", requires=("gtsam", "scipy", "numba"), certifies=True)
+@method(
+    "shonan",
+    title="Shonan",
+    cite="dellaert2020",
+    requires=("gtsam", "scipy", "numba"),
+    certifies=True,
+    invariant_to_deg=0.1,  # it stops at a relative decrease of 1e-7
+    uses=("weights", "precisions"),
+)
 @dataclass(frozen=True)
 class Shonan(Warm):
     """Minimises the sum of squared (or Huber) chordal residuals on SO(p), from p = 3 upward until certified.
@@ -38,7 +47,8 @@ class Shonan(Warm):
       only, from a random vector.
 
     GTSAM's keys are camera-to-world rotations S_i = R_i^T with measurements S_i^T S_j, which is R_ij as it
-    stands. The weights of a problem are not used.
+    stands. A measurement has the deviation sigma / sqrt(w_ij), w being the `confidence` of the edges: squares are
+    multiplied by w, and where the Huber loss is linear, residuals are by its root.
 
     Parameters
     ----------
@@ -63,7 +73,7 @@ class Shonan(Warm):
         return self._huber(problem) if self.loss == "huber" else self._l2(problem)
 
     def _l2(self, problem: Problem) -> Estimate:
-        found = spectral_rotations(problem)[0]
+        found = spectral_rotations(problem, confidence(problem))[0]
         conversion = Stopwatch()
         with conversion.running():
             start, measurements = values_of(found), _measurements(problem, sigma=1.0)
@@ -79,29 +89,33 @@ class Shonan(Warm):
             notes = (f"not certified up to p={self.p_max}: a local optimum on SO(3) is returned",)
         with conversion.running():
             rotations = rotations_of(values, problem.n)
+        certificate = smallest_eigenvalue(problem, rotations)
+        if not notes and not certified(problem, certificate):
+            reason = "optimum of the relaxation"
+            notes = (f"not certified: rounding to SO(3) leaves a smallest eigenvalue of {certificate:.1e}",)
         return Estimate(
             rotations,
             stop_reason=reason,
             cost=chordal_cost(problem, rotations),
-            certificate=smallest_eigenvalue(problem, rotations),
+            certificate=certificate,
             conversion_s=conversion.seconds,
             notes=notes,
         )
 
     def _huber(self, problem: Problem) -> Estimate:
-        sigma = np.radians(self.sigma_deg)
-        found = spectral_rotations(problem)[0]
+        sigma, weights = np.radians(self.sigma_deg), confidence(problem)
+        found = spectral_rotations(problem, confidence(problem))[0]
         conversion = Stopwatch()
         with conversion.running():
             start, measurements = values_of(found), _measurements(problem, sigma)
         values, _ = self._averaging(measurements, certify=False).run(start, 3, 3)
         with conversion.running():
             rotations = rotations_of(values, problem.n)
-        residual = 2 * np.sqrt(2) * np.sin(problem.residuals(rotations) / 2) / sigma
+        residual = 2 * np.sqrt(2) * np.sin(problem.residuals(rotations) / 2) / sigma * np.sqrt(weights)
         cost = np.where(residual <= HUBER, 0.5 * residual**2, HUBER * (residual - 0.5 * HUBER)).sum()
         return Estimate(
             rotations,
-            edge_weights=HUBER / np.maximum(residual, HUBER),
+            edge_weights=weights * HUBER / np.maximum(residual, HUBER),
             stop_reason="local optimum on SO(3)",
             cost=float(cost),
             conversion_s=conversion.seconds,
@@ -119,11 +133,12 @@ class Shonan(Warm):
 
 
 def _measurements(problem: Problem, sigma: float) -> list[Any]:
-    """GTSAM's measurements; sigma is the standard deviation of a chordal residual."""
+    """GTSAM's measurements; sigma is the standard deviation of a chordal residual of an edge of confidence one."""
     import gtsam
 
-    noise = gtsam.noiseModel.Isotropic.Sigma(3, sigma)
+    sigmas = (sigma / np.sqrt(confidence(problem))).tolist()
+    noises = {value: gtsam.noiseModel.Isotropic.Sigma(3, value) for value in set(sigmas)}
     return [
-        gtsam.BinaryMeasurementRot3(i, j, gtsam.Rot3(rotation), noise)
-        for (i, j), rotation in zip(problem.edges.tolist(), problem.rotations, strict=True)
+        gtsam.BinaryMeasurementRot3(i, j, gtsam.Rot3(rotation), noises[value])
+        for (i, j), rotation, value in zip(problem.edges.tolist(), problem.rotations, sigmas, strict=True)
     ]

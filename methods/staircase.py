@@ -7,7 +7,14 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, method, parameter
 
-from ._lib.linear.certificate import chordal_cost, smallest_eigenpair, smallest_eigenvalue
+from ._lib.graph.confidence import strengths
+from ._lib.linear.certificate import (
+    certified,
+    chordal_cost,
+    smallest_eigenpair,
+    smallest_eigenvalue,
+    weighted_blocks,
+)
 from ._lib.linear.rounding import nearest_rotations
 from ._lib.starts import Seeded, Start, start_rotations
 
@@ -21,6 +28,7 @@ SHORTEST_STEP = 1e-6
     cite="boumal2016",
     requires=("pymanopt", "scipy", "numba"),
     certifies=True,
+    uses=("weights", "precisions"),
 )
 @dataclass(frozen=True)
 class Staircase(Seeded):
@@ -39,7 +47,7 @@ class Staircase(Seeded):
     (the escape, the rounding); the trust region method is pymanopt's, with its defaults, the polar
     retraction, and the gradient and Hessian given by hand. Deviations: the first p is 3, SE-Sync's 5; SE-Sync's
     preconditioner is a factorization. The certificate of the estimate belongs to the rounded rotations. The
-    weights of a problem are used by the spanning-tree start alone.
+    terms are weighted by the `confidence` of the edges, and so are G and the degrees.
 
     Parameters
     ----------
@@ -71,14 +79,22 @@ class Staircase(Seeded):
                 break
             points = _escaped(problem, points, direction)
         rotations = _rounded(points)
-        certified = smallest >= -threshold
+        certificate = smallest_eigenvalue(problem, rotations)
+        reason, notes = f"critical point at p = p_max = {p}", tuple[str, ...]()
+        if smallest < -threshold:
+            notes = (f"not certified up to p={p}; the smallest eigenvalue is {smallest:.1e}",)
+        elif certified(problem, certificate):
+            reason = f"certified at p = {p}"
+        else:
+            reason = f"optimum of the relaxation at p = {p}"
+            notes = (f"not certified: rounding from p = {p} leaves a smallest eigenvalue of {certificate:.1e}",)
         return Estimate(
             rotations,
             iterations=iterations,
-            stop_reason=f"certified at p = {p}" if certified else f"critical point at p = p_max = {p}",
+            stop_reason=reason,
             cost=chordal_cost(problem, rotations),
-            certificate=smallest_eigenvalue(problem, rotations),
-            notes=() if certified else (f"not certified up to p={p}; the smallest eigenvalue is {smallest:.1e}",),
+            certificate=certificate,
+            notes=notes,
         )
 
     def _minimised(self, problem: Problem, points: Floats, gradient_norm: float) -> tuple[Floats, int]:
@@ -89,7 +105,7 @@ class Staircase(Seeded):
 
         n, _, p = points.shape
         manifold = Stiefel(p, 3, k=n, retraction="polar")
-        measurements, degree = problem.block_matrix(), problem.degree[:, None, None]
+        measurements, degree = weighted_blocks(problem), strengths(problem)[:, None, None]
 
         def product(x: Floats) -> Floats:
             """G Y (n, p, 3); pymanopt's points are the transposes Y_i^T (p, 3)."""

@@ -7,20 +7,22 @@ import numpy as np
 
 from bench import Checkpoint, Estimate, Floats, Problem, method, parameter, so3
 
+from ._lib.graph.confidence import confidence, strengths
 from ._lib.loops import geodesic_kernels
 from ._lib.starts import SEEDED, Start, Started, start_rotations
 
 CHORDAL = 8.0  # squared Frobenius distance of two rotations over the sine squared of half their angle
 
 
-@method("tg-mcmc", title="TG-MCMC", cite="birdal2018", requires=("scipy", "numba"))
+@method("tg-mcmc", title="TG-MCMC", cite="birdal2018", requires=("scipy", "numba"), uses=("weights", "precisions"))
 @dataclass(frozen=True)
 class TGMCMC(Started):
-    """Minimises sum_ij sin(angle(R_i^T R_ij R_j) / 2)^2, the negative log-likelihood of Bingham noise, by cooling.
+    """Minimises sum_ij w_ij sin(angle(R_i^T R_ij R_j) / 2)^2, the negative log-likelihood of Bingham noise, by cooling.
 
     A camera is a unit quaternion q_i with a velocity v_i tangent to the sphere. With the potential
-    U = sum_ij 1 - <q_ij, q_i conj(q_j)>^2, whatever the signs of the quaternions, and inverse temperature beta, the
-    dynamics dq = v dt, dv = -grad U dt - c v dt + sqrt(2 c / beta) dW have exp(-beta U) as the density of q. A step is
+    U = sum_ij w_ij (1 - <q_ij, q_i conj(q_j)>^2), w being the `confidence` of the edges, and inverse temperature beta,
+    the dynamics dq = v dt, dv = -grad U dt - c v dt + sqrt(2 c / beta) dW have exp(-beta U) as the density of q.
+    A step is
 
     1. v <- e^(-c h) v: friction.
     2. v <- v - h grad U + noise, projected onto the tangent space.
@@ -32,8 +34,8 @@ class TGMCMC(Started):
 
     Source: Birdal, Simsekli, Eken and Ilic, NeurIPS 2018 (the model with rotations only, the splitting, the tempering).
     Deviations: there are no translations and no prior; the Bingham distribution of an edge has one concentration for
-    its three axes, the same for all edges; it samples no posterior, so that there is no uncertainty of the rotations;
-    each camera has its number of measurements as its mass, so that one step suits all; the variance of the noise is
+    its three axes; it samples no posterior, so that there is no uncertainty of the rotations;
+    each camera has the sum of its w as its mass, so that one step suits all; the variance of the noise is
     (1 - e^(-2 c h)) / beta over the mass, exact for friction alone; the schedule is ours.
 
     The cost is a sum of squares: with equal concentrations the method is as sensitive to outliers as `shonan` with
@@ -84,13 +86,13 @@ class TGMCMC(Started):
         clock = time.perf_counter()
         measured = so3.to_quaternion(problem.rotations)
         cameras = so3.to_quaternion(start_rotations(self.init, problem, rng))
-        masses = problem.degree.astype(float)
+        weights, masses = confidence(problem), strengths(problem)
         velocities, forces, kicks = np.zeros((3, problem.n, 4))
         energy, tolerance = np.empty(1), np.radians(self.tolerance_deg)
         checkpoints = list[Checkpoint]()
         converged, t = False, 0
         while t < self.iterations and not converged:
-            geodesic_kernels.bingham_forces(problem.edges, measured, cameras, forces, energy)
+            geodesic_kernels.bingham_forces(problem.edges, measured, weights, cameras, forces, energy)
             if t % self.checkpoint_every == 0:
                 checkpoints.append(_checkpoint(t, clock, cameras, energy[0]))
             temperature = self._temperature(t)
@@ -102,7 +104,7 @@ class TGMCMC(Started):
             t += 1
             rotated = 2 * self.step * np.sqrt(np.sum(velocities**2) / problem.n)
             converged = temperature == 0 and rotated < tolerance
-        geodesic_kernels.bingham_forces(problem.edges, measured, cameras, forces, energy)
+        geodesic_kernels.bingham_forces(problem.edges, measured, weights, cameras, forces, energy)
         checkpoints.append(_checkpoint(t, clock, cameras, energy[0]))
         return Estimate(
             checkpoints[-1].rotations,
@@ -112,6 +114,7 @@ class TGMCMC(Started):
             else "iteration limit",
             cost=float(CHORDAL * energy[0]),
             checkpoints=tuple(checkpoints),
+            notes=() if converged else (f"not converged: cameras still turned by {np.degrees(rotated):.1e} degrees",),
         )
 
     def _temperature(self, t: int) -> float:

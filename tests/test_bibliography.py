@@ -21,7 +21,7 @@ def test_every_plugin_cites_what_there_is(info: object) -> None:
 
 
 def test_every_dataset_has_a_reference() -> None:
-    assert all(cite_keys(info) for info in catalog("dataset"))
+    assert all(cite_keys(info) for info in catalog("dataset") if not info.facts["takes_paths"])
 
 
 def test_every_entry_is_whole() -> None:

@@ -1,5 +1,6 @@
 """Every built-in method against the conformance checks; the checks against methods that break them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,16 @@ def test_no_method_is_deterministic_from_a_start_that_draws(start: str) -> None:
     for info in METHODS:
         if "init" in info.defaults():
             assert not info.fact("deterministic", info.configure({"init": start})), info.name
+
+
+def test_dependence_on_labels_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It shows on sparse graphs with outliers only, not on a dozen well connected cameras."""
+    monkeypatch.setattr("bench.running.conformance.CHECKS", CHECKS[6:7])
+    for name, result in (("crdmf", "failed"), ("l1-irls", "passed")):
+        info = METHODS[name]
+        promising = replace(info, facts={**info.facts, "invariant_to_deg": 4.0})
+        finding = next(iter(check_method(promising, {})))
+        assert (finding.check, finding.result) == ("relabelled cameras", result)
 
 
 def failed(plugin: Path, fault: str) -> set[str]:

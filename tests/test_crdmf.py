@@ -9,6 +9,7 @@ from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 from bench.core.problem import Ints
 from bench.methods._lib.dmf import dmf_thin
 from bench.methods._lib.dmf.crdmf_dense import SymmetricFactorization
+from bench.methods._lib.graph.all_triangles import AllTriangles
 from bench.methods.crdmf import CRDMF, agrees_with_tree, reweighted
 from bench.methods.spectral import Spectral
 from bench.plugins.declare import Source
@@ -35,7 +36,8 @@ def test_noise_free_problems_are_solved(edges: Ints, init: str) -> None:
 
 def test_the_filter_keeps_inliers_and_drops_outliers() -> None:
     problem, truth = simulated(NOISY, noise_deg=2, outliers=0.15)
-    kept, residuals = agrees_with_tree(problem), problem.residuals(truth)
+    kept = agrees_with_tree(problem, AllTriangles.of(problem))
+    residuals = problem.residuals(truth)
     assert kept[residuals < np.radians(25)].all()
     assert not kept[residuals > np.radians(60)].any()
 

@@ -60,7 +60,7 @@ def test_noise_free_problems_are_solved_exactly(method: Peer, edges: np.ndarray)
 def test_the_first_order_solver_is_accurate_without_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, truth = simulated(SMALL)
     elsewhere = so3.random(np.random.default_rng(1), problem.n)
-    monkeypatch.setattr("bench.methods.sdp.spectral_rotations", lambda problem: (elsewhere, None))
+    monkeypatch.setattr("bench.methods.sdp.spectral_rotations", lambda *_: (elsewhere, None))
     estimate = SDP(eps=1e-8).solve(problem, RNG)
     assert estimate.iterations
     assert errors_deg(estimate.rotations, truth).max() < 1e-6
@@ -118,7 +118,7 @@ def test_shonan_climbs_out_of_a_local_minimum_or_says_that_it_could_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     problem, local = winding_ring()
-    monkeypatch.setattr("bench.methods.shonan.spectral_rotations", lambda problem: (local, None))
+    monkeypatch.setattr("bench.methods.shonan.spectral_rotations", lambda *_: (local, None))
     climbed, stuck = Shonan().solve(problem, RNG), Shonan(p_max=3).solve(problem, RNG)
     assert climbed.cost == pytest.approx(0, abs=1e-3)
     assert not climbed.notes

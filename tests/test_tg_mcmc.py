@@ -21,7 +21,7 @@ def rng(seed: int = 0) -> np.random.Generator:
 def energy_and_forces(problem: Problem, cameras: Floats) -> tuple[float, Floats]:
     forces, energy = np.empty_like(cameras), np.empty(1)
     measured = so3.to_quaternion(problem.rotations)
-    geodesic_kernels.bingham_forces(problem.edges, measured, cameras, forces, energy)
+    geodesic_kernels.bingham_forces(problem.edges, measured, np.ones(problem.m), cameras, forces, energy)
     return float(energy[0]), forces
 
 
@@ -59,7 +59,7 @@ def test_at_a_constant_temperature_the_samples_have_the_bingham_density() -> Non
     velocities, forces, energy = np.zeros((2, 4)), np.zeros((2, 4)), np.zeros(1)
     generator, keep, squares = rng(3), 0.9, []
     for step in range(40_000):
-        geodesic_kernels.bingham_forces(edge.edges, measured, cameras, forces, energy)
+        geodesic_kernels.bingham_forces(edge.edges, measured, np.ones(edge.m), cameras, forces, energy)
         kicks = np.sqrt((1 - keep**2) * noise**2 / 2) * generator.standard_normal((2, 4))
         geodesic_kernels.geodesic_step(cameras, velocities, forces, np.ones(2), kicks, keep, 0.2)
         if step > 100:

@@ -7,12 +7,13 @@ import numpy as np
 from bench import Floats, Problem, so3
 
 from .graph.cemp import TRIANGLES, corruption_levels, tree_of_least_corruption
+from .graph.confidence import confidence, has_counts, ranking
 from .graph.trees import tree_rotations
 from .graph.triangles import sample_triangles
 from .linear.spectral import spectral_rotations
 from .warm_up import Warm
 
-Start = Literal["spectral", "spanning-tree", "cemp-mst", "random"]
+Start = Literal["auto", "spectral", "spanning-tree", "cemp-mst", "random"]
 SEEDED = ("cemp-mst", "random")  # starts that draw from the generator, so that no method is deterministic with them
 TOLERANCE = 1e-2  # radians between the eigenspace found and the true one; a start need not be better
 
@@ -58,6 +59,13 @@ class Refined(Started):
         return self.tolerance_deg if self.init == "random" else 1e-6
 
 
+def resolved(name: Start, problem: Problem) -> Start:
+    """The start that "auto" stands for, see `start_rotations`."""
+    if name != "auto":
+        return name
+    return "spanning-tree" if has_counts(problem) else "spectral"
+
+
 def start_rotations(name: Start, problem: Problem, rng: np.random.Generator) -> Floats:
     """Rotations (n, 3, 3) to start from.
 
@@ -65,13 +73,15 @@ def start_rotations(name: Start, problem: Problem, rng: np.random.Generator) -> 
     ----------
     name
         "spectral": the normalised spectral solution, D regularised by its mean. "spanning-tree": propagation
-        along the tree of `SpanningTree`, the one place where a problem's weights enter. "cemp-mst": propagation
+        along the tree of `SpanningTree`. Both use the `confidence` of the edges. "auto": "spanning-tree" where the
+        edges come with match counts, which tell good ones from bad; otherwise "spectral". "cemp-mst": propagation
         along the tree that `CEMP` with its default parameters finds. "random": uniform on SO(3).
     """
+    name = resolved(name, problem)
     if name == "spectral":
-        return spectral_rotations(problem, regularisation=1.0, tolerance=TOLERANCE)[0]
+        return spectral_rotations(problem, confidence(problem), regularisation=1.0, tolerance=TOLERANCE)[0]
     if name == "spanning-tree":
-        return tree_rotations(problem, problem.weights)
+        return tree_rotations(problem, ranking(problem))
     if name == "cemp-mst":
         levels = corruption_levels(sample_triangles(problem, TRIANGLES, rng))
         return tree_of_least_corruption(problem, levels)

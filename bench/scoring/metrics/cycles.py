@@ -32,9 +32,9 @@ class Cycles:
 def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
     """Triangles drawn uniformly and with replacement; the same ones for the same graph.
 
-    So many paths a - c - b are drawn uniformly, the middle c in proportion to the number of its pairs of neighbours; those
-    that an edge (a, b) closes are kept, and the others not replaced. Every triangle is closed from three paths, so none
-    is preferred.
+    So many paths a - c - b are drawn uniformly, the middle c in proportion to the number of its pairs of neighbours;
+    those that an edge (a, b) closes are kept, and the others not replaced. Every triangle is closed from three paths,
+    so none is preferred.
     """
     rng = np.random.default_rng(0)
     pair = problem.edges[:, 0].astype(np.int64) * problem.n + problem.edges[:, 1]

@@ -6,6 +6,7 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, so3
 
+from ..graph.confidence import confidence
 from .descent import Descent
 from .iterate import SMALLEST_WEIGHT
 
@@ -24,10 +25,11 @@ def refined(
 ) -> Estimate:
     """Alternate weighted least squares in the tangent space with new weights.
 
-    In iteration t = 1, 2, ... all cameras move to the minimum of sum_ij w_ij |x_i - x_j - b_ij|^2, where
-    exp(b_ij) = R_i^T R_ij R_j; then the level of each edge becomes h_ij / (t + 1) + r_ij t / (t + 1), r_ij being its
-    residual divided by pi. A weight is w_ij = level^(-3/2), at most 1e8; the worst edges, one in twenty more each
-    iteration up to one in five, get the smallest weight, 1e-10 of the largest.
+    In iteration t = 1, 2, ... all cameras move to the minimum of sum_ij c_ij w_ij |x_i - x_j - b_ij|^2, where
+    exp(b_ij) = R_i^T R_ij R_j and c is the `confidence` of the edges; then the level of each edge becomes
+    h_ij / (t + 1) + r_ij t / (t + 1), r_ij being its residual divided by pi. A weight is w_ij = level^(-3/2), at most
+    1e8; the worst edges, one in twenty more each iteration up to one in five, get the smallest weight, 1e-10 of the
+    largest.
 
     Deviations from both authors' codes: the smallest weight is relative (theirs is 1e-8, so that weights span 16
     decades, more than a factorization in double precision bears); residuals are those of the moved cameras, not of
@@ -47,19 +49,20 @@ def refined(
     Returns
     -------
     Estimate
-        Its `edge_weights` are the level^(-3/2) at the end, the worst edges included, so that they rank all edges.
+        Its `edge_weights` are the c_ij level^(-3/2) at the end, the worst edges included, so that they rank all edges.
     """
+    trust = confidence(problem)
     descent = Descent(problem, start, np.radians(tolerance_deg))
     kept, converged = 1.0, False
     while not converged and descent.iterations < iterations:
-        converged = descent.step(_weights(levels, kept)) < np.radians(tolerance_deg)
+        converged = descent.step(trust * _weights(levels, kept)) < np.radians(tolerance_deg)
         residuals = descent.angles / np.pi
         share = 1 / (descent.iterations + 1)
         levels = share * levels_by_cycles(residuals) + (1 - share) * residuals
         kept = max(KEPT_AT_LEAST, kept - KEPT_LESS)
     return Estimate(
         so3.from_quaternion(descent.cameras),
-        edge_weights=_weights(levels, 1.0, smallest=0.0),
+        edge_weights=trust * _weights(levels, 1.0, smallest=0.0),
         iterations=descent.iterations,
         stop_reason=f"mean step below {tolerance_deg:g} degrees" if converged else "iteration limit",
     )

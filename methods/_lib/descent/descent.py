@@ -4,6 +4,7 @@ import numpy as np
 
 from bench import Floats, Problem
 
+from ..graph.confidence import confidence
 from ..linear.laplacian import LaplacianSolver
 from ..loops import edge_kernels
 from .iterate import floored
@@ -28,15 +29,19 @@ class Descent:
         self._tolerance = tolerance
         self._edges = problem.edges
         self._measured = _quaternions(problem.rotations)
+        self._confidence = confidence(problem)
         self._laplacian = LaplacianSolver(problem, LINEAR_TOLERANCE)
         self._measure()
+
+    def weights(self, loss: Loss, scale: float) -> Floats:
+        """(m,) how much each edge counts here: its confidence times the weight of its loss."""
+        return self._confidence * loss.weight(self.angles / scale)
 
     def reweight(self, loss: Loss, scale: float, limit: int) -> bool:
         """Iterate with the weights of `loss`; whether the mean step fell below the tolerance in time."""
         length = np.inf
         for _ in range(limit):
-            weights = loss.weight(self.angles / scale)
-            length = self.step(floored(weights), SLOW * length)
+            length = self.step(floored(self.weights(loss, scale)), SLOW * length)
             if length < self._tolerance:
                 return True
         return False

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from bench import Floats, Problem
 
+from ..graph.confidence import strengths
+
 Single = NDArray[np.float32]
 Loss = Literal["l1", "l2", "l1/2"]
 Report = Callable[[int, float], None]
@@ -32,17 +34,20 @@ class Observed:
         (9, k) the entries of the blocks.
     order
         (k,) which of the edges (0 to m - 1), the edges read backwards (m to 2m - 1) and the identities each block is.
+    count
+        (n,) number of observed blocks in each camera's row, an edge counting with its `confidence`.
     """
 
     first: NDArray[np.uint32]
     neighbour: NDArray[np.uint32]
     blocks: Single
     order: NDArray[np.intp]
+    count: Floats
 
-    @property
-    def count(self) -> Floats:
-        """(n,) number of observed blocks in each camera's row."""
-        return np.diff(self.first.astype(np.int64)).astype(float)
+    def weigh(self, weights: Floats) -> Single:
+        """(k,) weight of each block from those of the edges (m,); the identities have the weight one."""
+        identities = np.ones(len(self.count))
+        return np.concatenate([weights, weights, identities])[self.order].astype(np.float32)
 
     @classmethod
     def of(cls, problem: Problem) -> "Observed":
@@ -54,7 +59,7 @@ class Observed:
         blocks = np.concatenate([problem.rotations, transposed, np.broadcast_to(np.eye(3), (n, 3, 3))])
         first = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
         flat = np.ascontiguousarray(blocks[order].reshape(-1, 9).T, dtype=np.float32)
-        return cls(first.astype(np.uint32), columns[order].astype(np.uint32), flat, order)
+        return cls(first.astype(np.uint32), columns[order].astype(np.uint32), flat, order, 1 + strengths(problem))
 
 
 @dataclass

@@ -45,6 +45,10 @@ class AllTriangles:
         """(m,) number of triangles at each edge among those that are `closing` (t,)."""
         return np.bincount(self.edges[closing].ravel(), minlength=m)
 
+    def missing(self, m: int) -> NDArray[np.bool_]:
+        """(m,) whether an edge is in no triangle."""
+        return np.bincount(self.edges.ravel(), minlength=m) == 0
+
     def mean_distance(self, m: int) -> Floats:
         """(m,) mean of the norms, not squared, over the triangles at each edge; 0 where there is none."""
         distances, sums = np.sqrt(self.errors), np.zeros(m)

@@ -9,6 +9,7 @@ from .triangles import Triangles
 
 TRIANGLES = 50
 ITERATIONS = 6
+DIGITS = 9  # of a level; beyond, two are the same
 MOST_ITERATIONS = 10  # beyond, the products of weights leave the range of floating point
 
 
@@ -25,8 +26,12 @@ def corruption_levels(triangles: Triangles, iterations: int = ITERATIONS) -> Flo
 
 
 def tree_of_least_corruption(problem: Problem, levels: Floats) -> Floats:
-    """Rotations (n, 3, 3) along the spanning tree of smallest total `levels` (m,)."""
-    return tree_rotations(problem, -levels)
+    """Rotations (n, 3, 3) along the spanning tree of smallest total `levels` (m,).
+
+    The edges of a triangle that shares none with another have the same level, up to rounding, by which no tree should
+    be chosen: it depends on the labels.
+    """
+    return tree_rotations(problem, -np.round(levels, DIGITS))
 
 
 def inlier_weights(levels: Floats, iterations: int = ITERATIONS) -> Floats:

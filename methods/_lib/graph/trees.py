@@ -57,7 +57,9 @@ def _heaviest_tree(problem: Problem, weights: Floats) -> EdgeIds:
     by_rank = np.lexsort((so3.angle(problem.rotations), -weights))
     ranks = np.empty(problem.m)
     ranks[by_rank] = np.arange(1, problem.m + 1)
-    tree = minimum_spanning_tree(_upper(problem, np.arange(problem.m), ranks))
+    pairs = problem.edges[by_rank, 0].astype(np.int64) * problem.n + problem.edges[by_rank, 1]
+    best = by_rank[np.unique(pairs, return_index=True)[1]]  # of parallel edges
+    tree = minimum_spanning_tree(_upper(problem, best, ranks[best]))
     chosen: EdgeIds = by_rank[tree.data.astype(np.intp) - 1]
     return chosen
 
@@ -82,7 +84,7 @@ def _search(problem: Problem, chosen: EdgeIds, root: int) -> tuple[Ints, Ints]:
     """Parents (n,), negative at the root, and depths (n,) of a breadth-first search of the `chosen` edges."""
     from scipy.sparse.csgraph import breadth_first_order
 
-    graph = _upper(problem, chosen, np.ones(len(chosen)))
+    graph = _upper(problem, chosen, np.ones(len(chosen)))  # parallel edges add up
     order, parent = breadth_first_order(graph, root, directed=False)
     above, depth = parent.tolist(), [0] * problem.n
     for camera in order[1:].tolist():

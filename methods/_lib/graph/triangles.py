@@ -53,6 +53,12 @@ class Triangles:
         return means
 
 
+def note_on_missing(missing: NDArray[np.bool_], consequence: str) -> tuple[str, ...]:
+    """What to say of the edges in no triangle, the mask (m,) of which is `missing`; nothing where there are none."""
+    count = int(missing.sum())
+    return (f"{count} of {len(missing)} edges in no triangle: {consequence}",) if count else ()
+
+
 def sample_triangles(problem: Problem, most: int, rng: np.random.Generator) -> Triangles:
     """Up to `most` triangles over each edge: all where there are no more, else drawn without replacement.
 
@@ -79,8 +85,11 @@ def codegrees(problem: Problem) -> Ints:
 
 def _neighbours(problem: Problem) -> tuple[Ints, Ints, Ints]:
     """CSR lists: where that of each camera begins (n + 1,), its neighbours (2m,), and the edges to them (2m,)."""
-    lists = problem.adjacency(np.arange(1.0, problem.m + 1))
-    return lists.indptr, lists.indices, lists.data.astype(np.int32) - 1
+    i, j = problem.edges.T
+    ends, others = np.concatenate([i, j]), np.concatenate([j, i])
+    order = np.lexsort((others, ends))
+    first = np.concatenate([[0], np.cumsum(problem.degree)]).astype(np.int32)
+    return first, others[order], (order % problem.m).astype(np.int32)
 
 
 @compiled
@@ -107,7 +116,7 @@ def _sample(offsets: Ints, neighbours: Ints, ids: Ints, seed: int, counts: Ints,
     """Fill `counts` (m,) and `sides` (m, k, 2) of `Triangles`, given the lists of `_neighbours`."""
     n, most = offsets.shape[0] - 1, sides.shape[1]
     to_i = np.full(n, -1, dtype=np.int32)
-    found = np.empty((n, 2), dtype=np.int32)
+    found = np.empty((np.diff(offsets).max(), 2), dtype=np.int32)
     np.random.seed(seed)  # noqa: NPY002 - compiled code has a generator of its own
     for i in range(n):
         to_i[neighbours[offsets[i] : offsets[i + 1]]] = ids[offsets[i] : offsets[i + 1]]

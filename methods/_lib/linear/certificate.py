@@ -6,6 +6,7 @@ import numpy as np
 
 from bench import Floats, Problem
 
+from ..graph.confidence import confidence
 from .eigen import smallest
 
 if TYPE_CHECKING:
@@ -13,14 +14,20 @@ if TYPE_CHECKING:
 
 PRECISION = 1e-10  # of the eigenvalue, relative to the largest one
 LARGE = 1200  # rows; from here on one eigenvalue alone is found faster than a block
+ZERO = 1e-4  # of an eigenvalue, relative to the mean degree
 ROUNDING = 4e-15  # of the cost, for each edge
 
 
 def chordal_cost(problem: Problem, rotations: Floats) -> float:
-    """Sum over the edges of the squared Frobenius norm of R_ij - R_i R_j^T, at R (n, 3, p)."""
+    """Sum over the edges of confidence times the squared Frobenius norm of R_ij - R_i R_j^T, at R (n, 3, p)."""
     i, j = problem.edges.T
     difference = problem.rotations - rotations[i] @ np.swapaxes(rotations[j], -1, -2)
-    return float(np.sum(difference**2))
+    return float(np.sum(confidence(problem)[:, None, None] * difference**2))
+
+
+def weighted_blocks(problem: Problem) -> "sparse.csr_array":
+    """G (3n, 3n): R_ij times the confidence of the edge in block (i, j), its transpose in block (j, i)."""
+    return problem.block_matrix(confidence(problem))
 
 
 def multipliers(measurements: "sparse.csr_array", rotations: Floats) -> Floats:
@@ -29,7 +36,7 @@ def multipliers(measurements: "sparse.csr_array", rotations: Floats) -> Floats:
     Parameters
     ----------
     measurements
-        (3n, 3n), the `Problem.block_matrix`.
+        (3n, 3n), the `weighted_blocks`.
     rotations
         (n, 3, p) with orthonormal rows; p is three, or more where they are relaxed.
     """
@@ -59,12 +66,17 @@ def smallest_eigenvalue(problem: Problem, rotations: Floats) -> float:
     return smallest_eigenpair(problem, rotations)[0]
 
 
+def certified(problem: Problem, eigenvalue: float) -> bool:
+    """Whether a `smallest_eigenvalue` is zero up to what rounding to rotations leaves of it."""
+    return eigenvalue >= -ZERO * float(problem.degree.mean())
+
+
 def smallest_eigenpair(problem: Problem, rotations: Floats) -> tuple[float, Floats]:
     """`smallest_eigenvalue` with its vector, as blocks (n, 3); `rotations` as in `multipliers`."""
     from scipy import sparse
     from scipy.sparse.linalg import eigsh
 
-    measurements = problem.block_matrix()
+    measurements = weighted_blocks(problem)
     certificate = certificate_matrix(measurements, multipliers(measurements, rotations))
     size = 3 * problem.n
     start = np.random.default_rng(0).standard_normal((size, 3))

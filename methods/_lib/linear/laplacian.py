@@ -6,6 +6,7 @@ import numpy as np
 
 from bench import Floats, Ints, Problem
 
+from ..graph.confidence import confidence, strengths
 from ..loops import edge_kernels
 from ..loops.edge_kernels import Singles
 
@@ -22,9 +23,10 @@ MOST_PRODUCTS = 500  # of conjugate gradients in one system, before it is factor
 
 
 def block_laplacian(problem: Problem, blocks: Floats) -> "sparse.bsr_array":
-    """Matrix (k n, k n) of the sum over the edges of |x_i - B_ij x_j|^2, for orthogonal `blocks` B_ij (m, k, k).
+    """Matrix (k n, k n) of the sum over the edges of w_ij |x_i - B_ij x_j|^2, for orthogonal `blocks` B_ij (m, k, k).
 
-    It has the degrees times the identity on the diagonal, -B_ij in block (i, j) and -B_ij^T in block (j, i).
+    w is the `confidence`. Block (i, i) is the sum of the w of camera i times the identity, block (i, j) is -w_ij B_ij,
+    block (j, i) its transpose.
     """
     from scipy import sparse
 
@@ -33,9 +35,12 @@ def block_laplacian(problem: Problem, blocks: Floats) -> "sparse.bsr_array":
     rows, cols = np.concatenate([i, j, np.arange(n)]), np.concatenate([j, i, np.arange(n)])
     order = np.lexsort((cols, rows))
     starts = np.searchsorted(rows[order], np.arange(n + 1))
-    diagonal = problem.degree[:, None, None] * np.eye(k)
+    diagonal = strengths(problem)[:, None, None] * np.eye(k)
+    blocks = confidence(problem)[:, None, None] * blocks
     data = np.concatenate([-blocks, -np.swapaxes(blocks, -1, -2), diagonal])[order]
-    return sparse.bsr_array((data, cols[order], starts), shape=(k * n, k * n))
+    matrix = sparse.bsr_array((data, cols[order], starts), shape=(k * n, k * n))
+    matrix.sum_duplicates()
+    return matrix
 
 
 class LaplacianSolver:
@@ -158,15 +163,16 @@ class _SparseSystem:
         pattern.setdiag(problem.degree[:size] + 1.0)
         place = _factor(pattern, "MMD_AT_PLUS_A").perm_c
         self._order = np.argsort(place)
-        entries = np.arange(1.0, len(rows) + 1)
-        self._matrix = sparse.csc_array((entries, (place[rows], place[cols])), shape=(size, size))
-        self._matrix.sort_indices()
-        self._entry = self._matrix.data.astype(np.intp) - 1
+        column_by_column, self._entry = np.unique(place[cols] * np.int64(size) + place[rows], return_inverse=True)
+        starts = np.searchsorted(column_by_column, np.arange(size + 1) * np.int64(size))
+        entries = np.empty(len(column_by_column))
+        self._matrix = sparse.csc_array((entries, column_by_column % size, starts), shape=(size, size))
         self._kept = kept
 
     def solve(self, weights: Floats, degrees: Floats, right: Floats) -> Floats:
         off_diagonal = -weights[self._kept]
-        self._matrix.data = np.concatenate([off_diagonal, off_diagonal, degrees[:-1]])[self._entry]
+        values = np.concatenate([off_diagonal, off_diagonal, degrees[:-1]])
+        self._matrix.data = np.asarray(np.bincount(self._entry, values), dtype=np.float64)  # parallel edges add up
         x = np.empty_like(right)
         x[self._order] = _factor(self._matrix, "NATURAL").solve(right[self._order])
         return x

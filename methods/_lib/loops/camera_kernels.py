@@ -83,12 +83,20 @@ def rotation_sweep(first: Ints, neighbours: Ints, measured: Floats, rotations: F
 
 @compiled
 def median_sweep(
-    order: Ints, first: Ints, neighbours: Ints, measured: Floats, met_angle: float, cameras: Floats, turns: Floats
+    order: Ints,
+    first: Ints,
+    neighbours: Ints,
+    measured: Floats,
+    weights: Floats,
+    met_angle: float,
+    cameras: Floats,
+    turns: Floats,
 ) -> None:
     """Move each camera one Weiszfeld step towards the median of what its neighbours predict, one after the other.
 
-    Where camera i coincides with k of the predictions R_ij R_j the step is that of Vardi and Zhang: the pull
-    of the others, a sum of unit vectors, is shortened by k, and the camera stays where nothing is left of it.
+    Where camera i coincides with predictions R_ij R_j whose weights add up to k, the step is that of Vardi and Zhang:
+    the pull of the others, a weighted sum of unit vectors, is shortened by k, and the camera stays where nothing is
+    left of it.
 
     Parameters
     ----------
@@ -98,6 +106,8 @@ def median_sweep(
         (n + 1,) and (2m,): the neighbours j of camera i stand from first[i] to first[i + 1].
     measured
         (2m, 4) quaternions of R_ij, in step with `neighbours`.
+    weights
+        (2m,) of these predictions.
     met_angle
         Radians below which a prediction and the camera are the same.
     cameras
@@ -125,11 +135,11 @@ def median_sweep(
             sine = math.sqrt(u * u + v * v + t * t)
             angle = 2 * math.atan2(sine, abs(cosine))
             if angle < met_angle:
-                met += 1
+                met += weights[h]
                 continue
-            unit = 1 / sine if cosine > 0 else -1 / sine
+            unit = weights[h] / sine if cosine > 0 else -weights[h] / sine
             x, y, z = x + unit * u, y + unit * v, z + unit * t
-            stiffness += 1 / angle
+            stiffness += weights[h] / angle
         pull = math.sqrt(x * x + y * y + z * z)
         turns[i] = 0.0
         if pull <= met or stiffness == 0:

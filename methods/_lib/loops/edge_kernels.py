@@ -211,7 +211,7 @@ def dense_laplacian(edges: Ints, weights: Floats, degrees: Floats, matrix: Float
     for e in range(edges.shape[0]):
         i, j = edges[e, 0], edges[e, 1]
         if j < size:
-            matrix[i, j] = -weights[e]
+            matrix[i, j] -= weights[e]
 
 
 @compiled

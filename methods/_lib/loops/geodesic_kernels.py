@@ -8,13 +8,15 @@ from .edge_kernels import compiled
 
 
 @compiled
-def bingham_forces(edges: Ints, measured: Floats, cameras: Floats, forces: Floats, energy: Floats) -> None:
-    """Energy sum_ij 1 - <q_ij, q_i conj(q_j)>^2 and minus its gradient.
+def bingham_forces(
+    edges: Ints, measured: Floats, weights: Floats, cameras: Floats, forces: Floats, energy: Floats
+) -> None:
+    """Energy sum_ij w_ij (1 - <q_ij, q_i conj(q_j)>^2) and minus its gradient.
 
     Parameters
     ----------
-    edges, measured, cameras
-        (m, 2), (m, 4) and (n, 4); the signs of the quaternions do not matter.
+    edges, measured, weights, cameras
+        (m, 2), (m, 4), (m,) and (n, 4); the signs of the quaternions do not matter.
     forces, energy
         (n, 4) and (1,), filled.
     """
@@ -30,8 +32,8 @@ def bingham_forces(edges: Ints, measured: Floats, cameras: Floats, forces: Float
         i3 = w * d + x * c - y * b + z * a
         a, b, c, d = cameras[i]
         cosine = a * i0 + b * i1 + c * i2 + d * i3
-        energy[0] += 1 - cosine * cosine
-        pull = 2 * cosine
+        energy[0] += weights[k] * (1 - cosine * cosine)
+        pull = 2 * weights[k] * cosine
         forces[i, 0] += pull * i0
         forces[i, 1] += pull * i1
         forces[i, 2] += pull * i2
