@@ -22,7 +22,7 @@ LIES = ("seed", "system", "global", "hash", "clock")
 
 
 def deterministic_cells(run: Run) -> list[Cell]:
-    return [c for c in run.cells if c.method.fact("deterministic", c.method.configure(c.job.parameters))]
+    return [c for c in run.cells if not c.method.varies(c.method.configure(c.job.parameters))]
 
 
 def estimates(cells: Sequence[Cell], store: Store, seed: int) -> dict[str, bytes]:

@@ -137,6 +137,10 @@ class Info:
 class MethodInfo(Info):
     """What is known of a method."""
 
+    def varies(self, configured: Method) -> bool:
+        """Whether another seed may give another estimate of the same problem."""
+        return not self.fact("deterministic", configured) or self.fact("depends_on_labels", configured)
+
     def configure(self, parameters: Mapping[str, Any]) -> Method:
         """Make the configured method; raises as `Info.configure`."""
         return cast(Method, super().configure(parameters))

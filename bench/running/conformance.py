@@ -214,7 +214,7 @@ def _deterministic_as_declared(kit: _Kit) -> None:
         raise NotApplicable("declared as not deterministic")
     problem, _ = _noisy()
     first = kit.solve(problem, seed=3)
-    if not np.array_equal(first, kit.solve(problem, seed=4)):
+    if not kit.promised("depends_on_labels") and not np.array_equal(first, kit.solve(problem, seed=4)):
         raise Failed("declared deterministic, but the seed changes the estimate")
     if not np.array_equal(first, kit.solve_in_a_fresh_process(problem, seed=3)):
         raise Failed("declared deterministic, but another process gives another estimate")

@@ -186,8 +186,7 @@ def _cells_of(
     cells = []
     for info, parameters in methods:
         configured_method = info.configure(parameters)
-        varies = not info.fact("deterministic", configured_method) or info.fact("depends_on_labels", configured_method)
-        repeated = not source.seeded and varies
+        repeated = not source.seeded and info.varies(configured_method)
         refused = [] if use is None else sorted(set(info.fact("uses", configured_method)) - set(use))
         complete, source_hash = parameters_of(configured_method), info.source_hash
         for method_seed in range(seeds) if repeated else (seed,):
