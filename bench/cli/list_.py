@@ -50,7 +50,10 @@ def _list_plugins(kind: str, plugins: list[Path]) -> None:
         typer.echo(f"{info.name:<15} {info.summary}{state}")
         details = [selection.format_selection("defaults", info.defaults())]
         details += [f"cite {info.cite}"] if info.cite else []
-        details += [name.replace("_", " ") for name in ("robust", "certifies") if info.facts.get(name)]
+        details += [
+            name.replace("_", " ") for name in ("robust", "certifies", "depends_on_labels") if info.facts.get(name)
+        ]
+        details += [f"uses {', '.join(info.facts['uses'])}"] if info.facts.get("uses") else []
         if info.facts.get("max_cameras"):
             details.append(f"up to {info.facts['max_cameras']} cameras")
         typer.echo(f"{'':<15}   {'; '.join(details)}")
