@@ -130,7 +130,7 @@ def test_dry_run_writes_nothing(tmp_path: Path) -> None:
         (("run", "-m", "spectral[normalized=true]"), "did you mean 'normalised'?"),
         (("run", "-m", "spectral[normalised=maybe]"), "must be true or false, not 'maybe'"),
         (("run", "-m", "spectral["), "cannot read the selection 'spectral['"),
-        (("run", "-d", "erdos-renyi[n=1]"), "n must be from 2 to 30000, not 1"),
+        (("run", "-d", "erdos-renyi[n=1]"), "must be at least 2 and at most 30000, not 1"),
         (("run", "-d", "1dsfm", "--protocol", "componnt"), "must be 'truth-subgraph' or 'component', not 'componnt'"),
         (("run", "-d", "1dsfm[scene=Elis_Island]"), "did you mean 'Ellis_Island'?"),
         (("run", "--data-dir", "nowhere"), "nowhere"),
