@@ -19,9 +19,10 @@ class Given:
 
     Parameters
     ----------
-    whole, problem
-        The problem, and what is given of it: its largest component, with what the method uses of what came with the
-        measurements.
+    problem
+        What is given: the largest component, with what the method uses of what came with the measurements.
+    n, m
+        Cameras and edges of the whole; kept, since a method may tamper with a problem that is not a part.
     cameras
         (k,) the cameras of the whole that are given, in the order in which they are.
     edges, place
@@ -30,8 +31,9 @@ class Given:
         What a reader of the estimate must know of that.
     """
 
-    whole: Problem
     problem: Problem
+    n: int
+    m: int
     cameras: NDArray[np.intp]
     edges: NDArray[np.bool_]
     place: NDArray[np.intp]
@@ -69,16 +71,16 @@ class Given:
             count = problem.m
             problem, place = fused(problem)
             notes += (f"{count} measurements of {problem.m} pairs: those of one pair made one, their geodesic median",)
-        return cls(whole, problem, cameras, edges, place, notes)
+        return cls(problem, whole.n, whole.m, cameras, edges, place, notes)
 
     def restored(self, estimate: Estimate) -> Estimate:
         """The estimate for the whole graph, NaN for what was not given."""
         weights = estimate.edge_weights
         if weights is not None:
-            weights = _spread(np.asarray(weights)[self.place], self.whole.m, self.edges)
+            weights = _spread(np.asarray(weights)[self.place], self.m, self.edges)
 
         def of_all(rotations: Floats) -> Floats:
-            return _spread(rotations, self.whole.n, self.cameras)
+            return _spread(rotations, self.n, self.cameras)
 
         return replace(
             estimate,
