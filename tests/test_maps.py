@@ -188,7 +188,7 @@ import numpy as np
 from bench import Instance, Problem, Source, dataset, method, so3, stream
 
 
-@method("brittle", title="Brittle")
+@method("brittle", title="Brittle", uses=("weights",))
 @dataclass(frozen=True)
 class Brittle:
     """Right where the first weight is below a limit."""

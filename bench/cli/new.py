@@ -21,30 +21,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import Estimate, Problem, method, so3
+from bench import Estimate, Problem, method, parameter, so3
 
 
-@method("{name}", title="{title}")
+@method("{name}", title="{title}", uses=("weights",))
 @dataclass(frozen=True)
 class {cls}:
     """Minimises the sum of |R_ij R_j - R_i|^2, the rotations relaxed to orthonormal columns.
 
     The three smallest eigenvectors of the connection Laplacian, projected (Martinec and Pajdla 2007).
-    Replace objective, steps and source by yours. Fields are parameters: ``{name}[weighted=true]``.
+    Replace objective, steps and source by yours. Fields are parameters: ``{name}[power=0.5]``.
     """
 
-    weighted: bool = False
+    power: float = parameter(1.0, at_least=0)  # of the weights that come with the measurements
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:
         """R_ij = R_i R_j^T on every edge (i, j) of a connected graph; NaN marks a camera not solved."""
-        weights = problem.weights if self.weighted and problem.weights is not None else np.ones(problem.m)
+        weights = problem.relative_weights**self.power
         degree = np.bincount(problem.edges.ravel(), weights=np.repeat(weights, 2), minlength=problem.n)
         laplacian = problem.block_matrix(values=-weights, diagonal=degree)
         _, vectors = np.linalg.eigh(laplacian.toarray())
         blocks = vectors[:, :3].reshape(problem.n, 3, 3)
         if np.linalg.det(blocks).sum() < 0:
             blocks = -blocks
-        return Estimate(so3.project(blocks), notes=("weights used",) if self.weighted else ())
+        return Estimate(so3.project(blocks))
 '''
 
 DATASET = '''"""{title}: replace this by what the scenes are."""
