@@ -122,6 +122,19 @@ def test_a_method_that_depends_on_names_has_a_row_for_every_seed(plugin: Path, t
     ]
 
 
+def test_a_table_of_one_seed_says_whose_answer_depends_on_names(plugin: Path, tmp_path: Path) -> None:
+    for seeds, told in ((1, True), (3, False)):
+        run = Run(
+            None, ["teller", "blind"], ["weighted"], Options(out=tmp_path / str(seeds), seeds=seeds, plugins=(plugin,))
+        )
+        run.prepare()
+        list(run.execute())
+        notes = score(run.store).footnotes
+        assert (
+            "teller: the answer depends on the names of the cameras; more seeds show how much (--seeds)" in notes
+        ) == told
+
+
 def rows(plugin: Path, folder: Path, use: tuple | None) -> tuple[dict[str, str], list[str]]:
     run = Run(None, ["teller", "blind"], ["weighted"], Options(out=folder, plugins=(plugin,), use=use))
     run.prepare()

@@ -1,7 +1,8 @@
-"""Who used what came with the measurements: rows of one table that differ in this are not rivals on equal terms."""
+"""What rows of one table do not share: who used what came with the measurements, whose answer hangs on names."""
 
 from typing import TYPE_CHECKING
 
+from bench.execution.given import BY_NAME
 from bench.plugins.selection import label
 
 if TYPE_CHECKING:
@@ -28,6 +29,14 @@ def notes_on_use(frame: "pd.DataFrame", offered: "pd.Series[str]") -> list[str]:
                 (users if name in used.split() else others).append(label(method, params))
             sentences[f"{dataset}/{instance}: {_sentence(name, users, others)}"] = None
     return list(sentences)
+
+
+def notes_on_names(frame: "pd.DataFrame") -> list[str]:
+    """A sentence for the methods whose answers depend on the names of the cameras, where one seed cannot show that."""
+    by_name = frame[frame["notes"].str.contains(BY_NAME, regex=False)]
+    alone = by_name.groupby(["dataset", "instance", "method", "params"], sort=False).filter(lambda rows: len(rows) == 1)
+    labels = dict.fromkeys(map(label, alone["method"], alone["params"]))
+    return [f"{', '.join(labels)}: {BY_NAME} (--seeds)"] if labels else []
 
 
 def _sentence(name: str, users: list[str], others: list[str]) -> str:

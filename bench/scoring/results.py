@@ -14,7 +14,7 @@ from bench.plugins.selection import format_parameters, label, parse
 from bench.scoring.cache import Scores, scores_of
 from bench.scoring.inference.seed_ties import MANY_SEEDS, tied_by_seed
 from bench.scoring.inference.statistics import tied
-from bench.scoring.information import notes_on_use
+from bench.scoring.information import notes_on_names, notes_on_use
 from bench.scoring.metrics.alignment import RULES
 from bench.scoring.metrics.errors import summary
 from bench.scoring.metrics.oracle import ORACLE, Curve, curve
@@ -125,6 +125,7 @@ def score(
     footnotes = [
         *_instance_notes(frame, scores.table),
         *used,
+        *notes_on_names(frame),
         *notes_on_versions(jobs),
         *scores.unreadable,
         *dict.fromkeys(itertools.chain(*{plan.source: plan.missing for plan in plans}.values())),
