@@ -184,3 +184,11 @@ def top_names(readme: str) -> set[str]:
 def test_names_at_the_top_are_read_from_the_tree() -> None:
     tree = "# X\n\n## Where things are\n\n```\nbench/core/   what results are\n    x.py\na.md, b.md  # c.md\n```\n"
     assert top_names(tree) == {"bench", "a.md", "b.md"}
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"])
+def test_every_path_that_a_page_names_is_there(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:bench|methods|datasets|results|tests)/[\w./-]*)`", text))
+    assert len(named) > 1 or page == "CHANGELOG.md"
+    assert {path for path in named if not (ROOT / path).exists()} - {"results/runs/"} == set()
