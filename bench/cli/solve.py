@@ -53,7 +53,8 @@ def solve(
     if estimate.edge_weights is not None:
         said["edge_weights"] = estimate.edge_weights
     write(loaded.cameras, estimate.rotations, said)
-    typer.echo(f"{chosen}: {report.solve_s or 0.0:.2f} s{_fit(problem, estimate)}")
+    ended_by = f", ended by: {estimate.stop_reason}" if estimate.stop_reason else ""
+    typer.echo(f"{chosen}: {report.solve_s or 0.0:.2f} s{ended_by}{_fit(problem, estimate)}")
     typer.echo(f"wrote {out}")
 
 
