@@ -78,6 +78,12 @@ def test_a_child_that_does_not_end_well_is_one_sentence(faulty_plugin: Path) -> 
         bench.solve([[0, 1]], np.eye(3)[None], "faulty[fault=segfault]", plugins=[faulty_plugin], supervised=True)
 
 
+def test_a_method_meant_for_fewer_cameras_declines_in_this_process_too() -> None:
+    edges = [[k, k + 1] for k in range(400)]
+    with pytest.raises(bench.Skipped, match="401 cameras, and sdp is meant for at most 300"):
+        bench.solve(edges, np.tile(np.eye(3), (400, 1, 1)), "sdp")
+
+
 def test_misuse_of_score_is_one_sentence() -> None:
     with pytest.raises(InputError, match=r"shape \(n, 3, 3\), not \(2, 3, 3\) and \(3, 3, 3\)"):
         bench.score(np.tile(np.eye(3), (2, 1, 1)), np.tile(np.eye(3), (3, 1, 1)))

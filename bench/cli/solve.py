@@ -8,10 +8,7 @@ import typer
 from bench.cli.options import PluginOption, UseOption, used
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from bench.core.problem import Estimate, Problem
-    from bench.formats import GraphFile
 
 
 def solve(
@@ -29,9 +26,11 @@ def solve(
 ) -> None:
     """Solve one graph with one method and write the absolute rotations (world to camera)."""
     from bench.core.limits import Limits
+    from bench.core.problem import Instance
     from bench.execution.single import SingleSolver
     from bench.formats import read_graph, rotations_writer
     from bench.plugins.catalog import catalog, default_method
+    from bench.scoring.doubts import doubts
 
     chosen = method or default_method()
     info, parameters = catalog("method", plugin or []).one(chosen)
@@ -41,7 +40,7 @@ def solve(
     typer.echo(f"{graph}: {problem.n} cameras, {problem.m} edges")
     with SingleSolver(info, parameters, Limits(timeout, memory, threads), used(use)) as solver:
         ended, report, estimate, _ = solver.solve(problem, seed)
-    for note in (*loaded.notes, *report.notes, *_doubts(loaded)):
+    for note in (*loaded.notes, *report.notes, *doubts(Instance(problem, None, str(graph), ids=loaded.cameras))):
         typer.echo(f"note: {note}")
     if estimate is None:
         typer.echo(f"{chosen}: {ended.text}", err=True)
@@ -56,16 +55,6 @@ def solve(
     ended_by = f", ended by: {estimate.stop_reason}" if estimate.stop_reason else ""
     typer.echo(f"{chosen}: {report.solve_s or 0.0:.2f} s{ended_by}{_fit(problem, estimate)}")
     typer.echo(f"wrote {out}")
-
-
-def _doubts(loaded: "GraphFile") -> "Iterator[str]":
-    from bench.core.redundancy import loops_told
-    from bench.scoring.conventions import diagnose
-
-    if unchecked := loops_told(loaded.problem):
-        yield unchecked
-    if diagnosis := diagnose(loaded.problem, ids=loaded.cameras):
-        yield diagnosis.sentence
 
 
 def _fit(problem: "Problem", estimate: "Estimate") -> str:

@@ -132,16 +132,13 @@ def run(request: Request, prepared: Prepared | None = None) -> None:
 def solve(request: Request, prepared: Prepared) -> Result:
     """Run the job and write its estimate; whatever the method raises comes through."""
     info, method, problem = prepared.info, prepared.method, prepared.problem
-    limit = info.fact("max_cameras", method)
-    if limit is not None and problem.n > limit:
-        raise Skipped(f"{problem.n} cameras, and {info.name} is meant for at most {limit}")
+    given = Given.of(problem, info, method, request.use, request.seed)
     for name in info.requires_of(request.parameters):
         importlib.import_module(name)
     report = Report(threads=pin_threads(request.threads), core=_pin_core(request.core))
     if request.warm_up and hasattr(method, "warm_up"):
         method.warm_up()
 
-    given = Given.of(problem, info, method, request.use, request.seed)
     used = tuple(sorted(given.problem.carries))
     pristine = copy.copy(given.problem)  # what a solution caches in its problem, the next one must not find
     memory = _PeakMemory()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.core.fusion import fused
-from bench.core.problem import Estimate, Floats, Information, Problem
+from bench.core.problem import Estimate, Floats, Information, Problem, Skipped
 from bench.core.seeds import stream
 from bench.plugins.declare import Method, MethodInfo
 
@@ -55,7 +55,15 @@ class Given:
             What it may use of what came with the measurements; None for all.
         seed
             From 1 on, the cameras of a method that depends on their names have other names.
+
+        Raises
+        ------
+        Skipped
+            Where there are more cameras than the method is meant for.
         """
+        limit = info.fact("max_cameras", method)
+        if limit is not None and whole.n > limit:
+            raise Skipped(f"{whole.n} cameras, and {info.name} is meant for at most {limit}")
         uses = info.fact("uses", method)
         problem = whole.keeping([name for name in uses if use is None or name in use])
         cameras = np.flatnonzero(whole.components == 0)

@@ -37,7 +37,10 @@ INSTANCES = 8  # kept in memory; jobs come instance by instance
 SOURCES = (
     "core/so3.py",
     "core/problem.py",
+    "core/redundancy.py",
     "scoring/row.py",
+    "scoring/doubts.py",
+    "scoring/conventions/*.py",
     "scoring/metrics/alignment.py",
     "scoring/metrics/errors.py",
     "scoring/metrics/roc.py",
@@ -196,7 +199,8 @@ def _doubts(store: Store, key: str) -> tuple[str, ...]:
 def _version() -> str:
     """Hash of the code that scores."""
     here = Path(bench.__file__).parent
-    return hashlib.sha256(b"".join((here / name).read_bytes() for name in SOURCES)).hexdigest()[:12]
+    files = [path for name in SOURCES for path in sorted(here.glob(name))]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:12]
 
 
 def _stamps(store: Store, jobs: Sequence[Job]) -> Any:
