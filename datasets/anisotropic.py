@@ -96,7 +96,7 @@ def _load(path: Path, identity: str) -> Instance:
         name=path.stem,
         source=f"anisotropic-ra: {path.name}",
         revision=identity,
-        notes=(*graph.notes, "ground truth is a bundle-adjusted reconstruction"),
+        notes=graph.notes,
         statistics=statistics(graph.problem),
     )
 

@@ -16,6 +16,7 @@ from ._simulated.statistics import statistics
 
 Weights = Literal["counts", "covariances"]
 
+DEFAULT: Weights = "counts"
 FOLDER = "image_graphs"
 NEEDED = {"edges", "rotations", "truth"}
 SCENES = ("castle-P30", "fountain-P11", "lego")
@@ -52,7 +53,7 @@ class ImageGraph:
     """
 
     scene: str | None = None
-    weights: Weights = "counts"
+    weights: Weights = DEFAULT
 
     def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source | Missing]:
         """Scenes in alphabetical order; those we know of that are not on disk as `Missing`.
@@ -68,7 +69,8 @@ class ImageGraph:
 
     def _source(self, path: Path) -> Source:
         identity = revision([path], self.weights)
-        return Source(path.stem, identity, lambda: _load(path, self.weights, identity))
+        name = path.stem if self.weights == DEFAULT else f"{path.stem}-{self.weights}"
+        return Source(name, identity, lambda: _load(path, self.weights, name, identity))
 
 
 def _is_one(path: Path) -> bool:
@@ -76,7 +78,7 @@ def _is_one(path: Path) -> bool:
     return arrays >= NEEDED and bool(arrays & {"weights", "num_matches"})
 
 
-def _load(path: Path, weights: Weights, identity: str) -> Instance:
+def _load(path: Path, weights: Weights, name: str, identity: str) -> Instance:
     graph = read_npz(path)
     truth = read_npz_rotations(path).rotations
     if len(truth) != graph.problem.n:
@@ -90,7 +92,7 @@ def _load(path: Path, weights: Weights, identity: str) -> Instance:
     return Instance(
         problem,
         truth,
-        name=path.stem,
+        name=name,
         source=f"two-view geometry by COLMAP: {path.name}, weights from {weights}",
         revision=identity,
         notes=graph.notes,

@@ -15,6 +15,8 @@ from ._simulated.statistics import statistics
 
 FOLDER = "registration"
 TRUTH = "gt.log"
+DEFAULT = "3dmatch"
+RENDERED = "iclnuim-"
 SUFFIX = "-evaluation"  # of the scenes' folders in the authors' repository
 UNSCORED = f"no ground truth ({TRUTH} is missing): not scored, cost and time only"
 
@@ -44,7 +46,7 @@ class Registration:
     """
 
     scene: str | None = None
-    descriptor: str = "3dmatch"
+    descriptor: str = DEFAULT
 
     def __post_init__(self) -> None:
         if not self.descriptor or Path(self.descriptor).name != self.descriptor:
@@ -64,7 +66,7 @@ class Registration:
             every = {name.stem for name in _public().names} - {Path(TRUTH).stem, "LICENSE"}
             raise InputError(f"registration has no '{self.descriptor}.log'{suggestion(self.descriptor, every)}")
         for name in chosen(self.scene, known, f"scene of registration with {self.descriptor}.log:"):
-            yield self._source(name, found[name]) if name in found else Missing(name)
+            yield self._source(name, found[name]) if name in found else Missing(self._label(name))
 
     def fetch(self, folder: Path | None = None, *, source: Repository | None = None, progress: bool = True) -> Path:
         """Download the logs of all scenes and descriptors, 3 MB, to ``registration/`` in `folder` or the cache.
@@ -94,8 +96,12 @@ class Registration:
                 found.setdefault(log.parent.name.removesuffix(SUFFIX), log)
         return dict(sorted(found.items()))
 
-    def _source(self, name: str, log: Path) -> Source:
-        identity = revision(_files(log))
+    def _label(self, scene: str) -> str:
+        """A name for tables, which have the scenes of all descriptors."""
+        return scene if self.descriptor == DEFAULT else f"{scene}-{self.descriptor}"
+
+    def _source(self, scene: str, log: Path) -> Source:
+        identity, name = revision(_files(log)), self._label(scene)
         return Source(name, identity, lambda: _load(name, log, identity))
 
 
@@ -122,9 +128,10 @@ def _load(name: str, log: Path, identity: str) -> Instance:
         graph.problem,
         truth,
         name=name,
-        source=f"3DMatch, {name}: {log.name}{' and ' + TRUTH if truth is not None else ''}",
+        source=f"3DMatch, {log.parent.name}: {log.name}{' and ' + TRUTH if truth is not None else ''}",
         revision=identity,
         notes=notes,
         statistics=statistics(graph.problem),
         ids=graph.cameras,
+        collection="ICL-NUIM" if name.startswith(RENDERED) else "3DMatch",
     )

@@ -21,7 +21,7 @@ Collection = Literal["scannet", "redwood"]
 Split = Literal["train", "test", "other", "all"]
 
 FAILED = 1e6  # residual that the authors give to a pair without registration
-TRUTH_OF = {"scannet": "BundleFusion", "redwood": "the reconstruction of each object, with three digits"}
+TITLES = {"scannet": "ScanNet", "redwood": "Redwood"}
 
 
 @dataset("scan-graph", title="Complete scan graphs", cite="huang2019", fetchable=True)
@@ -32,7 +32,8 @@ class ScanGraph:
     Of Huang et al. (2019): 100 scans of each of 152 scenes of ScanNet, 50 scans of each of 58 objects of Redwood. Pairs
     without overlap are edges too, so that 10 to 72 % of a scene's edges are within 10 degrees of the truth. The
     authors keep the residual of each registration; it tells right from wrong edges badly (area under the ROC curve 0.70
-    and 0.64) and is not taken for a weight.
+    and 0.64) and is not taken for a weight. The truth is BundleFusion's of ScanNet, and of Redwood the reconstruction of
+    each object, with three digits.
 
     A scene is ``<scene>.mat``, as published, or ``<scene>.npz`` with ``edges``, ``rotations`` and ``truth``, in
     ``scannet_fgr/`` and ``redwood_fgr/`` below the folder the user names, that of the environment variable
@@ -118,10 +119,11 @@ def _load(path: Path, collection: str, identity: str) -> Instance:
         dataclasses.replace(graph.problem, weights=None, precisions=None),
         truth,
         name=path.stem,
-        source=f"Learning2Sync, {collection}, fast global registration: {path.name}",
+        source=f"Learning2Sync, {TITLES[collection]}, fast global registration: {path.name}",
         revision=identity,
-        notes=(*graph.notes, f"ground truth from {TRUTH_OF[collection]}"),
+        notes=graph.notes,
         statistics=statistics(graph.problem),
+        collection=TITLES[collection],
     )
 
 
