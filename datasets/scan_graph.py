@@ -32,8 +32,8 @@ class ScanGraph:
     Of Huang et al. (2019): 100 scans of each of 152 scenes of ScanNet, 50 scans of each of 58 objects of Redwood. Pairs
     without overlap are edges too, so that 10 to 72 % of a scene's edges are within 10 degrees of the truth. The
     authors keep the residual of each registration; it tells right from wrong edges badly (area under the ROC curve 0.70
-    and 0.64) and is not taken for a weight. The truth is BundleFusion's of ScanNet, and of Redwood the reconstruction of
-    each object, with three digits.
+    and 0.64) and is not taken for a weight. The truth is BundleFusion's of ScanNet, and of Redwood the reconstruction
+    of each object, with three digits.
 
     A scene is ``<scene>.mat``, as published, or ``<scene>.npz`` with ``edges``, ``rotations`` and ``truth``, in
     ``scannet_fgr/`` and ``redwood_fgr/`` below the folder the user names, that of the environment variable

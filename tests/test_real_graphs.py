@@ -65,7 +65,7 @@ def test_truth_of_fragments_follows_from_the_true_pairs(tmp_path: Path, folder: 
 def test_fragments_without_true_pairs_are_not_scored(tmp_path: Path) -> None:
     write_log(tmp_path / "room" / "mine.log", TRUTH, [(0, 1), (1, 2)])
     instance = load(Registration(descriptor="mine"), tmp_path)
-    assert (instance.truth, instance.name) == (None, "room")
+    assert (instance.truth, instance.name) == (None, "room-mine")
     assert "not scored" in instance.notes[-1]
 
 
@@ -74,7 +74,7 @@ def test_each_descriptor_has_its_published_scenes(tmp_path: Path) -> None:
     assert len(sources) == 12
     assert all(source == Missing(source.name) for source in sources)
     of_fpfh = {source.name for source in Registration(descriptor="fpfh").sources(tmp_path, 0)}
-    assert of_fpfh == {f"iclnuim-{room}" for room in ("livingroom1", "livingroom2", "office1", "office2")}
+    assert of_fpfh == {f"iclnuim-{room}-fpfh" for room in ("livingroom1", "livingroom2", "office1", "office2")}
     with pytest.raises(InputError, match=r"registration has no 'fphf\.log'; did you mean 'fpfh'"):
         list(Registration(descriptor="fphf").sources(tmp_path, 0))
     with pytest.raises(InputError, match="did you mean 'iclnuim-office1'"):
