@@ -20,20 +20,20 @@ _SHARES = ("within_5_deg", "within_10_deg", "auc_1_deg", "auc_5_deg", "auc_10_de
 _SCORED = {
     "mean_deg": "mean °",
     "median_deg": "median °",
-    "within_5_deg": "<5° %",
-    "within_10_deg": "<10° %",
-    "auc_1_deg": "AUC 1° %",
-    "auc_5_deg": "AUC 5° %",
-    "auc_10_deg": "AUC 10° %",
+    "within_5_deg": "<5°",
+    "within_10_deg": "<10°",
+    "auc_1_deg": "AUC 1°",
+    "auc_5_deg": "AUC 5°",
+    "auc_10_deg": "AUC 10°",
 }
 _UNSCORED = {"residual_mean_deg": "residual mean °", "residual_median_deg": "residual median °"}
 _TIME = {"solve_s": "time s"}
 _FAILED = 180.0  # degrees, of a graph that a method did not solve, where methods are ranked
 _LEGEND = (
-    "means over the graphs; <5° and <10°: share of the scored cameras below; AUC: area under their recall curve up to "
-    "so many degrees, divided by it. A graph that a method did not solve counts as nothing there, and means of its "
-    "errors are not given"
+    "<5° and <10°: percent of the scored cameras below; AUC: area under their recall curve up to so many degrees, in "
+    "percent of what it can be"
 )
+_FAILURES = "a graph that a method did not solve counts as nothing there, and means of its errors are then not given"
 
 
 @dataclass(frozen=True)
@@ -188,8 +188,8 @@ def _units(collection: Collection, method: Configured) -> "np.ndarray[tuple[int,
 
 
 def _notes(collection: Collection, best: Set[Configured], times: str) -> Iterator[str]:
-    if len(collection.scenes) > 1:
-        yield f"{_LEGEND[0].upper()}{_LEGEND[1:]}; {times}."
+    several = len(collection.scenes) > 1
+    yield f"{'; '.join([_LEGEND] * collection.has_truth + [_FAILURES] * several + [times])}."
     if best and len(collection.scenes) > 1:
         yield (
             "Bold: not told apart from the best median, nor by the mean (over graphs as units, level 5 %, all pairs "
