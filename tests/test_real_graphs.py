@@ -212,7 +212,7 @@ def served(server: Server) -> Repository:
     names = ("3dmatch.log", "gt.log")
     files = [(f"data/room-evaluation/{name}", f"registration/room/{name}", len(data), sha) for name in names]
     address = f"http://127.0.0.1:{server.server_port}"
-    return Repository("owner/name", "c0ffee", "MIT", tuple(files), server=address)
+    return Repository("owner/name", "c0ffee", "MIT", "data", tuple(files), server=address)
 
 
 @pytest.fixture
@@ -244,7 +244,8 @@ def test_files_are_fetched_checked_and_read(
 
 def test_an_interrupted_file_goes_on_where_it_stopped(logs: Server, tmp_path: Path) -> None:
     logs.break_after = 100
-    with pytest.raises(InputError, match=r"100 of \d+ bytes are here; the same command goes on from there"):
+    advice = r"100 of \d+ bytes are here; .* or clone https://github.com/owner/name and name its data with --data-dir"
+    with pytest.raises(InputError, match=advice):
         served(logs).fetch(tmp_path, progress=False)
     logs.break_after = None
     served(logs).fetch(tmp_path, progress=False)

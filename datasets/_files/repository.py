@@ -26,6 +26,8 @@ class Repository:
         ``owner/name`` on GitHub, and the hash of the commit that the files are of.
     licence
         Under which they are published.
+    folder
+        What of a clone can be named in place of the downloads.
     files
         Path in the repository, path below the folder of downloads, size in bytes and SHA-256 of each.
     groups
@@ -37,6 +39,7 @@ class Repository:
     repository: str
     commit: str
     licence: str
+    folder: str
     files: tuple[tuple[str, str, int, str], ...]
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     server: str = GITHUB
@@ -65,12 +68,19 @@ class Repository:
                     if not _is(place, sha256):
                         url = f"{self.server}/{self.repository}/{self.commit}/{path}"
                         place.unlink(missing_ok=True)
-                        download(Archive(url, sha256, size, place.name), place.parent, progress=False)
+                        self._download(Archive(url, sha256, size, place.name), place.parent)
                     done += size
                     update(done)
         except OSError as error:
             raise InputError(f"{folder}: cannot be written: {error.strerror}") from error
         return folder
+
+    def _download(self, file: Archive, folder: Path) -> None:
+        try:
+            download(file, folder, progress=False)
+        except InputError as error:
+            address = f"https://github.com/{self.repository}"
+            raise InputError(f"{error}; or clone {address} and name its {self.folder} with --data-dir") from error
 
     def altered(self, path: Path) -> str:
         """What is wrong with a file that has a published one's name and another content; empty where nothing is."""
