@@ -11,6 +11,7 @@ from test_archive import Server
 from test_archive import _no_proxy as _no_proxy
 from test_archive import server as server
 
+import bench
 from bench.core import so3
 from bench.core.errors import InputError
 from bench.core.problem import Floats
@@ -296,3 +297,34 @@ def test_the_real_files_are_as_published_and_as_described(real_data: Path) -> No
         instance = load(dataset, real_data)
         residuals = np.degrees(instance.problem.residuals(instance.truth))  # type: ignore[arg-type]
         assert (residuals < limit).mean() == pytest.approx(share, abs=0.006)
+
+
+def errors_of(method: str, source: Source, *, counts: bool = False) -> dict[str, float]:
+    """Of a method that is given match counts, or nothing but the rotations."""
+    instance = source.load()
+    problem, weights = instance.problem, instance.problem.weights if counts else None
+    estimate = bench.solve(problem.edges, problem.rotations, method, weights, problem.n, weights_kind="count")
+    return bench.score(estimate, instance.truth)  # type: ignore[arg-type]
+
+
+@pytest.mark.real_data
+def test_the_real_graphs_have_the_difficulty_that_was_measured_elsewhere(real_data: Path) -> None:
+    """Figures of the data's description, of methods without counts."""
+    for scene, mean, share in (("castle-P30", 26.0, 0.70), ("lego", 44.4, 0.75)):
+        found = errors_of("l1-irls[init=spectral]", the_source(ImageGraph(scene), real_data))
+        assert (found["mean_deg"], found["within_10_deg"]) == pytest.approx((mean, share), abs=0.05)
+    shares = [
+        errors_of("cemp", source)["within_10_deg"]
+        for descriptor in ("3dmatch", "fpfh", "spin", "pcl_modified")
+        for source in Registration(descriptor=descriptor).sources(real_data, 0)
+        if isinstance(source, Source) and source.name.startswith("iclnuim")
+    ]
+    assert len(shares) == 12
+    assert np.mean(shares) == pytest.approx(0.28, abs=0.005)
+
+
+@pytest.mark.real_data
+def test_counts_are_what_solves_repeated_structure(real_data: Path) -> None:
+    source = the_source(ImageGraph("lego"), real_data)
+    assert errors_of("l1-irls[init=spanning-tree]", source, counts=True)["within_10_deg"] == 1
+    assert errors_of("l1-irls[init=spanning-tree]", source)["within_10_deg"] < 0.8

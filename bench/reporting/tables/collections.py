@@ -203,4 +203,5 @@ def _notes(collection: Collection, best: Set[Configured], times: str) -> Iterato
         entries = collection.entries(method)
         failed = list(chain.from_iterable((failure.status for failure in entry.failures) for entry in entries))
         for status in dict.fromkeys(failed):
-            yield f"{entries[0].label}: {status} on {failed.count(status)} of {len(collection.scenes)} graphs"
+            on = f" on {failed.count(status)} of {len(collection.scenes)} graphs" if several else ""
+            yield f"{entries[0].label}: {status}{on}"
