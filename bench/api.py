@@ -169,7 +169,7 @@ def score(estimate: "Estimate | Floats", truth: "Floats", align: str = "l1") -> 
     Returns
     -------
     ``mean_deg, median_deg, rms_deg, p90_deg, max_deg``, the shares ``within_5_deg`` and so on of the scored cameras,
-    and ``n_scored``.
+    the areas ``auc_5_deg`` and so on under their recall curve, and ``n_scored``.
 
     Raises
     ------

@@ -7,13 +7,13 @@ from typing import Literal
 
 import numpy as np
 
-from bench import Floats, InputError, Instance, Missing, Source, dataset, suggestion
+from bench import Floats, InputError, Instance, Missing, Source, dataset
 from bench.formats.graph import GraphFile
 from bench.formats.one_dsfm import BUNDLE, COMPONENT, EDGES, IMAGES, read_bundle, read_folder
 
 from ._files.archive import damaged, unpack
 from ._files.download import Archive, download
-from ._files.folders import cache, revision, roots
+from ._files.folders import cache, chosen, revision, roots
 from ._simulated.statistics import statistics
 
 Protocol = Literal["truth-subgraph", "component"]
@@ -79,10 +79,7 @@ class OneDSfM:
             On a scene that is neither official nor on disk, or a data folder that does not exist.
         """
         found = _scenes(data_dir)
-        known = sorted({*SCENES, *found})
-        if self.scene is not None and self.scene not in known:
-            raise InputError(f"there is no scene '{self.scene}' in 1dsfm{suggestion(self.scene, known)}")
-        for name in known if self.scene is None else [self.scene]:
+        for name in chosen(self.scene, {*SCENES, *found}, "scene of 1dsfm"):
             yield self._source(found[name]) if name in found else Missing(name)
 
     def fetch(self, folder: Path | None = None, *, archive: Archive = OFFICIAL, progress: bool = True) -> Path:

@@ -9,7 +9,7 @@ from bench import Instance, Missing, Source, dataset, suggestion
 from bench.formats.chain import propagated
 from bench.formats.pose_graph import read_pose_graph
 
-from ._files.folders import revision, roots
+from ._files.folders import named, places, revision
 from ._simulated.statistics import statistics
 
 SPHERE = "sphere2500"
@@ -19,31 +19,41 @@ FOLDER = "pose_graphs"
 @dataset("pose-graph", title="Pose graphs", cite="kaess2008")
 @dataclass(frozen=True)
 class PoseGraph:
-    """One pose graph: sphere2500 with its ground truth, or any g2o file without one.
+    """Pose graphs: sphere2500 with its ground truth, and any g2o file without one.
 
     Parameters
     ----------
     graph
         ``sphere2500`` (Kaess et al., simulated; 2500 poses, 4949 edges) comes inside GTSAM's wheel, with
-        its noise-free edges. Any other name is that of ``<name>.g2o`` in the data folder, or in
-        ``pose_graphs/`` below it.
+        its noise-free edges. Any other name is that of ``<name>.g2o`` in the folder the user names, in that of the
+        environment variable ``ROTSYNC_DATA_DIR`` or among the downloads, or in ``pose_graphs/`` below one of these.
+        None for sphere2500 and all that are there.
     """
 
-    graph: str = SPHERE
+    graph: str | None = SPHERE
 
     def __post_init__(self) -> None:
-        if not self.graph or Path(self.graph).name != self.graph:
+        if self.graph is not None and (not self.graph or Path(self.graph).name != self.graph):
             raise ValueError(f"graph is a name without folders and without .g2o, not '{self.graph}'")
 
     def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source | Missing]:
-        """The graph, or what to do to get it.
+        """Graphs, or what to do to get the one that is asked for: sphere2500, then the others in alphabetical order.
 
         Raises
         ------
         InputError
             On a data folder that does not exist.
         """
-        yield self._sphere() if self.graph == SPHERE else self._file(data_dir)
+        folders = places(data_dir, FOLDER)
+        found = named(folders, ["*.g2o"])
+        for name in [SPHERE, *sorted(found.keys() - {SPHERE})] if self.graph is None else [self.graph]:
+            if name == SPHERE:
+                yield self._sphere()
+            elif name in found:
+                yield _source(found[name])
+            else:
+                where = f"put {name}.g2o in {folders[0]} or name its folder with --data-dir"
+                yield Missing(name, f"{where}{suggestion(name, {SPHERE, *found})}")
 
     def _sphere(self) -> Source | Missing:
         folder = _gtsam_data()
@@ -53,16 +63,10 @@ class PoseGraph:
         identity = revision([measured, noise_free])
         return Source(SPHERE, identity, lambda: _load(measured, identity, noise_free))
 
-    def _file(self, data_dir: Path | None) -> Source | Missing:
-        folders = [folder for root in roots(data_dir) for folder in (root, root / FOLDER)]
-        paths = [folder / f"{self.graph}.g2o" for folder in folders]
-        path = next((path for path in paths if path.is_file()), None)
-        if path is not None:
-            identity = revision([path])
-            return Source(self.graph, identity, lambda: _load(path, identity))
-        names = {SPHERE, *(other.stem for folder in folders for other in folder.glob("*.g2o"))}
-        where = f"put {self.graph}.g2o in {folders[0]} or name its folder with --data-dir"
-        return Missing(self.graph, f"{where}{suggestion(self.graph, names)}")
+
+def _source(path: Path) -> Source:
+    identity = revision([path])
+    return Source(path.stem, identity, lambda: _load(path, identity))
 
 
 def _gtsam_data() -> Path:

@@ -7,7 +7,7 @@ from pathlib import Path
 from bench import Instance, Missing, Problem, Source, dataset, parameter, so3, stream, suggestion
 from bench.formats.npz import read_topology
 
-from ._files.folders import revision, roots
+from ._files.folders import named, places, revision
 from ._simulated.measurements import CODE, Measurements, OutlierModel
 from ._simulated.noise import Noise
 from ._simulated.statistics import statistics
@@ -52,9 +52,9 @@ class ViewGraph:
         InputError
             On a data folder that does not exist.
         """
-        folders = [folder for root in roots(data_dir) for folder in (root, root / FOLDER)]
-        found = {path.stem: path for folder in reversed(folders) for path in folder.glob("*.npz")}
-        wanted = sorted(found) if self.scene is None else [self.scene]
+        folders = places(data_dir, FOLDER)
+        found = named(folders, ["*.npz"])
+        wanted = list(found) if self.scene is None else [self.scene]
         for scene in wanted:
             if scene in found:
                 yield self._source(found[scene], seed)

@@ -4,10 +4,13 @@ import io
 import json
 import sqlite3
 import struct
+from collections.abc import Mapping
+from itertools import combinations
 
 import numpy as np
 
 from bench.core import so3
+from bench.core.problem import Floats
 
 N = 4
 EDGES = np.array([[0, 1], [1, 2], [2, 3], [0, 3], [0, 2]])
@@ -51,6 +54,37 @@ def matlab() -> tuple[bytes, ...]:
         savemat(file, {"RR": MEASURED.T, "I": EDGES.T + 1.0}, do_compression=compressed)
         files.append(file.getvalue())
     return tuple(files)
+
+
+def scan_summary() -> dict[str, Floats]:
+    """Arrays of a summary of Learning2Sync, exact: T_ij = X_j X_i^-1 above the diagonal; the last pair failed."""
+    poses, residuals = np.zeros((N, 4, N, 4)), np.zeros((N, N))
+    for i, j in combinations(range(N), 2):
+        poses[i, :3, j, :3] = TRUTH[j] @ TRUTH[i].T
+        poses[i, 3, j, 3], residuals[i, j] = 1, 0.1
+    residuals[N - 2, N - 1] = 1e6
+    true = np.tile(np.eye(4), (N, 1, 1))
+    true[:, :3, :3] = TRUTH
+    return {"T": poses.reshape(4 * N, 4 * N), "Tstar": true, "sigma": residuals}
+
+
+def anisotropic_blocks() -> dict[str, Floats]:
+    """Arrays of lu_sphinx, exact: R_ji above the diagonal, and M where tr(M) I - M is diag(1, 2, 3) + i in frame j."""
+    relative, alpha = np.zeros((N, 3, N, 3)), np.zeros((N, 3, N, 3))
+    for i, j in EDGES.tolist():
+        hessian = np.diag([1.0, 2, 3]) + i
+        relative[i, :, j] = TRUTH[j] @ TRUTH[i].T
+        alpha[i, :, j] = np.trace(hessian) / 2 * np.eye(3) - hessian
+    return {"Rrel": relative.reshape(3 * N, 3 * N), "Alpha": alpha.reshape(3 * N, 3 * N), "Rgt": TRUTH.reshape(-1, 3)}
+
+
+def mat(arrays: Mapping[str, Floats]) -> bytes:
+    """A MATLAB file of arrays, not compressed."""
+    from scipy.io import savemat
+
+    file = io.BytesIO()
+    savemat(file, dict(arrays))
+    return file.getvalue()
 
 
 def database() -> bytes:

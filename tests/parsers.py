@@ -23,8 +23,11 @@ from format_seeds import (
     RELATIVE,
     SWITCHABLE,
     TEXT,
+    anisotropic_blocks,
     database,
+    mat,
     matlab,
+    scan_summary,
 )
 from scenes import UNREGISTERED, bundle_camera, egs_line, write_scene
 
@@ -35,6 +38,8 @@ from bench.core.outcome import Outcome
 from bench.core.problem import Instance, Problem
 from bench.datasets._files.archive import damaged
 from bench.datasets._files.download import Archive
+from bench.datasets.anisotropic import read_blocks
+from bench.datasets.scan_graph import read_summary
 from bench.execution.output import UnusableError, read_output
 from bench.formats import read_graph, read_rotations, toml_file
 from bench.formats.npz import read_topology
@@ -269,6 +274,8 @@ PARSERS: dict[str, Parser] = {
     "information": Parser((INFO.encode(),), _log_with_information),
     "open3d": Parser((OPEN3D.encode(),), _file("graph.json", read_graph)),
     "matlab": Parser(matlab(), _file("graph.mat", read_graph)),
+    "scan-summary": Parser((mat(scan_summary()),), _file("scene.mat", read_summary)),
+    "anisotropic": Parser((mat(anisotropic_blocks()),), _file("scene.mat", read_blocks)),
     "database": Parser((database(),), _file("database.db", read_graph)),
     "images": Parser((IMAGES.encode(),), _file("images.txt", read_rotations)),
     "images-binary": Parser((IMAGES_BINARY,), _file("images.bin", read_rotations)),

@@ -59,6 +59,10 @@ def test_what_is_not_a_number_is_out_of_range() -> None:
         ("method", "crdmf[preset=paper,init=spectral]", "'init' has no meaning for preset=paper"),
         ("dataset", "view-graph[scene=../Wheel]", "without folders"),
         ("dataset", "pose-graph[graph=../secret]", "without folders"),
+        ("dataset", "registration[descriptor=../gt]", "without folders"),
+        ("dataset", "scan-graph[collection=kitti]", "must be 'scannet' or 'redwood'"),
+        ("dataset", "scan-graph[split=half]", "must be 'train' or 'test' or 'other' or 'all'"),
+        ("dataset", "image-graph[weights=matches]", "must be 'counts' or 'covariances'"),
     ],
 )
 def test_parameters_that_make_no_sense_are_refused(kind: str, text: str, complaint: str) -> None:

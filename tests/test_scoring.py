@@ -9,7 +9,7 @@ from bench.scoring.inference.resampling import camera_variance, combined, replic
 from bench.scoring.inference.seed_ties import tied_by_seed
 from bench.scoring.inference.statistics import confidence_interval, seed_half_width, tie_groups, tied
 from bench.scoring.metrics.alignment import RULES, align
-from bench.scoring.metrics.errors import camera_errors, edge_metrics, summary
+from bench.scoring.metrics.errors import AUC_DEG, camera_errors, edge_metrics, summary
 
 
 @pytest.fixture
@@ -170,6 +170,15 @@ class TestSummary:
 
     def test_a_share_under_an_angle_does_not_hold_the_angle(self):
         assert summary(np.array([4.9, 5.0]))["within_5_deg"] == 0.5
+
+    def test_the_area_under_the_recall_curve_is_exact(self):
+        """By hand, and against the integral of the step function over a fine grid."""
+        assert summary(np.array([0.0, 2.5, 10, 170, np.nan]))["auc_5_deg"] == pytest.approx((1 + 0.5) / 4)
+        errors = np.random.default_rng(0).gamma(1, 4, 30)
+        for limit in AUC_DEG:
+            middles = (np.arange(100_000) + 0.5) * limit / 100_000
+            recall = (errors[:, None] < middles).mean(axis=0)
+            assert summary(errors)[f"auc_{limit}_deg"] == pytest.approx(recall.mean(), abs=1e-5)
 
     def test_nothing_scored_has_the_same_keys(self):
         found = summary(np.full(3, np.nan))

@@ -26,7 +26,7 @@ def _list_suites() -> None:
 
     for name in suite_names():
         suite = load_suite(name)
-        typer.echo(f"{name:<10} {suite.title}")
+        typer.echo(f"{name:<13} {suite.title}")
 
 
 def _list_papers() -> None:

@@ -10,8 +10,10 @@ import typer
 
 if TYPE_CHECKING:
     from bench.core.problem import Information
+    from bench.reporting.tables import render
 
 Align = StrEnum("Align", ["L1", "CHORDAL", "KARCHER", "ANCHORS"])  # rules that remove the gauge
+By = StrEnum("By", ["SCENE", "COLLECTION"])  # what a table is of
 Format = StrEnum("Format", ["CONSOLE", "MARKDOWN", "CSV", "LATEX"])  # how a table is written
 
 
@@ -100,6 +102,11 @@ def used(given: str | None) -> "tuple[Information, ...] | None":
                 f"--use takes {','.join(INFORMATION)} or none, not '{name}'{suggestion(name, INFORMATION)}"
             )
     return tuple(name for name in INFORMATION if name in names)
+
+
+def tables_of(given: By | None) -> "render.By | None":
+    """What ``--by`` asks for; None where it was not given."""
+    return None if given is None else "scene" if given is By.SCENE else "collection"
 
 
 def run_folder(given: Path) -> Path:

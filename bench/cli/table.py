@@ -7,6 +7,7 @@ import typer
 from bench.cli.options import (
     Align,
     AlignOption,
+    By,
     Format,
     ProtocolOption,
     RunFolder,
@@ -14,6 +15,7 @@ from bench.cli.options import (
     console,
     run_folder,
     show,
+    tables_of,
     wear,
 )
 
@@ -25,6 +27,12 @@ def table(
     oracle: Annotated[
         bool, typer.Option("--oracle", help="Add the checkpoint that ground truth likes best, labelled so.")
     ] = False,
+    by: Annotated[
+        By | None,
+        typer.Option(
+            help="A table of every scene, or of means over collections.  [default: collection where one has several]"
+        ),
+    ] = None,
     format: Format = Format.CONSOLE,
     style: StyleOption = None,
 ) -> None:
@@ -35,4 +43,4 @@ def table(
 
     wear(style)
     results = score(Store.open(run_folder(run)), align.value, protocol, oracle=oracle)
-    show(render_table(results, format.value, **console()))
+    show(render_table(results, format.value, by=tables_of(by), **console()))

@@ -227,6 +227,8 @@ class Instance:
         What a reader of a table must know of it.
     ids
         (n,) what the files call the cameras; None where they are numbered.
+    collection
+        What it is one of many of, over which a table may take means; empty where it stands for itself.
     statistics
         What the paper's Table I prints of the scene, such as ``edges_percent`` and ``hardness``.
     """
@@ -241,6 +243,7 @@ class Instance:
     notes: tuple[str, ...] = ()
     statistics: Mapping[str, float] = field(default_factory=dict)
     ids: NDArray[np.int64] | None = None
+    collection: str = ""
 
 
 @dataclass(frozen=True, eq=False)

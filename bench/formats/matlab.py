@@ -1,9 +1,9 @@
-"""MATLAB files with ``RR`` and ``I``, as codes of rotation averaging keep them."""
+"""MATLAB files: arrays of numbers, and the ``RR`` and ``I`` in which codes of rotation averaging keep graphs."""
 
 import math
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -34,15 +34,7 @@ def read_matlab(path: Path) -> GraphFile:
     InputError
         Naming the file and the array, and the pair (from 1) where one is at fault.
     """
-    data = read_bytes(path)
-    if data.startswith(_V73):
-        raise InputError(f"{path}: this is a MATLAB 7.3 file; write it with save(..., '-v7')")
-    try:
-        arrays = _arrays(data)
-    except (struct.error, zlib.error, ValueError, OverflowError):
-        raise InputError(f"{path}: cannot be read as a MATLAB file; write it again") from None
-    if missing := {"RR", "I"} - arrays.keys():
-        raise InputError(f"{path}: there is no array of numbers '{min(missing)}' in it; RR is 3 x 3 x m and I 2 x m")
+    arrays = read_arrays(path, {"RR": "3 x 3 x m", "I": "2 x m"})
     pairs, matrices = arrays["I"], arrays["RR"]
     if matrices.ndim == 2:
         matrices = matrices[:, :, None]  # MATLAB drops the last axis of a single matrix
@@ -55,8 +47,34 @@ def read_matlab(path: Path) -> GraphFile:
     return build(ids, matrices.transpose(2, 1, 0), lambda row: f"{path}: column {row + 1} of I")
 
 
-def _arrays(data: bytes) -> dict[str, Floats]:
-    """The arrays RR and I, where they are there and hold real numbers.
+def read_arrays(path: Path, shapes: Mapping[str, str]) -> dict[str, Floats]:
+    """Read arrays of real numbers, of two or three axes, from a MATLAB file of version 5 to 7.
+
+    Parameters
+    ----------
+    shapes
+        Names of the arrays that must be there, each with its shape, for messages.
+
+    Raises
+    ------
+    InputError
+        Naming the file, and the array that is not there.
+    """
+    data = read_bytes(path)
+    if data.startswith(_V73):
+        raise InputError(f"{path}: this is a MATLAB 7.3 file; write it with save(..., '-v7')")
+    try:
+        arrays = _arrays(data, frozenset(name.encode() for name in shapes))
+    except (struct.error, zlib.error, ValueError, OverflowError):
+        raise InputError(f"{path}: cannot be read as a MATLAB file; write it again") from None
+    if missing := shapes.keys() - arrays.keys():
+        wanted = " and ".join(f"{name} is {shape}" for name, shape in shapes.items())
+        raise InputError(f"{path}: there is no array of numbers '{min(missing)}' in it; {wanted}")
+    return arrays
+
+
+def _arrays(data: bytes, wanted: frozenset[bytes]) -> dict[str, Floats]:
+    """The arrays that are wanted, where they are there and hold real numbers.
 
     scipy.io.loadmat reads what MATLAB writes; a damaged file may end the process.
     """
@@ -70,13 +88,13 @@ def _arrays(data: bytes) -> dict[str, Floats]:
         parts = _elements(content, order)
         flags, shape, name = (part for _, (_, part) in zip(range(3), parts, strict=False))
         (word,) = struct.unpack_from(f"{order}I", flags)
-        if name in (b"RR", b"I") and word & 0xFF in _NUMERIC and not word & _COMPLEX:
+        if name in wanted and word & 0xFF in _NUMERIC and not word & _COMPLEX:
             storage, numbers = next(parts, (0, b""))
             if storage not in _DTYPES:
                 raise ValueError
             lengths = struct.unpack(f"{order}{len(shape) // 4}i", shape)
             flat = np.frombuffer(numbers, np.dtype(order + _DTYPES[storage])).astype(np.float64)
-            if min(lengths) < 0 or math.prod(lengths) != len(flat) or len(lengths) > 3:
+            if min(lengths) < 0 or math.prod(lengths) != len(flat) or not 2 <= len(lengths) <= 3:
                 raise ValueError
             found[name.decode()] = flat.reshape(lengths, order="F")
     return found

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from bench.reporting import appearance
 from bench.reporting.tables import render
+from bench.reporting.tables.collections import has_collections
 from bench.reporting.tables.intervals import with_intervals
 from bench.reporting.tables.rows import scenes
 from bench.reporting.tables.standing import overall
@@ -17,23 +18,31 @@ EXTENSIONS = {"console": "txt", "markdown": "md", "csv": "csv", "latex": "tex"}
 
 
 def render_table(
-    results: Results, style: str, *, width: int = 100, terminal: bool = False
+    results: Results, style: str, *, by: render.By | None = None, width: int = 100, terminal: bool = False
 ) -> tuple[str, tuple[str, ...]]:
-    """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render.render`."""
+    """Text of a table, and the footnotes that are not in it; see `bench.reporting.tables.render.render`.
+
+    Unless told otherwise, it is by collection where a collection has several graphs, and by scene elsewhere; a
+    spreadsheet always has every scene.
+    """
     frame = appearance.current().ordered(results.frame)
-    if style == "csv":
+    by = by or ("collection" if style != "csv" and has_collections(frame) else "scene")
+    if style == "csv" and by == "scene":
         frame = with_intervals(frame, results.job_errors)
-    return render.render(frame, results.ties, results.footnotes, style, width=width, terminal=terminal)
+    return render.render(frame, results.ties, results.footnotes, style, by=by, width=width, terminal=terminal)
 
 
 def write_tables(results: Results, folder: Path) -> list[Path]:
-    """Write the table in every format to ``folder/tables``."""
+    """Write the table of all scenes in every format to a folder, and that of collections where there are any."""
     folder.mkdir(parents=True, exist_ok=True)
+    names: dict[render.By, str] = {"scene": "table"}
+    names |= {"collection": "collections"} if has_collections(results.frame) else {}
     written = []
-    for style, extension in EXTENSIONS.items():
-        path = folder / f"table-{results.alignment}.{extension}"
-        path.write_text(render_table(results, style)[0], encoding="utf-8")
-        written.append(path)
+    for by, name in names.items():
+        for style, extension in EXTENSIONS.items():
+            path = folder / f"{name}-{results.alignment}.{extension}"
+            path.write_text(render_table(results, style, by=by)[0], encoding="utf-8")
+            written.append(path)
     return written
 
 

@@ -46,11 +46,12 @@ SOURCES = (
     "scoring/metrics/roc.py",
 )
 
-_TEXT = ("protocol", "outcome", "status", "stop_reason", "used", "offered", "notes")
+_TEXT = ("protocol", "collection", "outcome", "status", "stop_reason", "used", "offered", "notes")
 _WHOLE = ("n_scored", "n_cameras", "n_edges", "n_solved", "n_checkpoints")
 _NUMBERS = (
     *("mean_deg", "median_deg", "rms_deg", "p90_deg", "max_deg"),
     *("within_1_deg", "within_3_deg", "within_5_deg", "within_10_deg", "within_30_deg"),
+    *("auc_1_deg", "auc_5_deg", "auc_10_deg"),
     *("solve_s", "peak_mib", "conversion_s", "roc_auc", "residual_mean_deg", "residual_median_deg"),
     *("cost_l1", "cost_l1_truth", "cost_l2", "cost_l2_truth", "edges_percent", "hardness"),
     *("cost", "certificate", "min_s", "waited"),

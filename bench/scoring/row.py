@@ -38,6 +38,7 @@ def scored(instance: Instance, record: Record | None, estimate: Estimate | None,
     report, round_s = (record.report, record.round_s) if record else (Report(), ())
     return {
         "protocol": instance.protocol,
+        "collection": instance.collection,
         "outcome": ended.kind,
         "status": ended.text,
         **summary(errors),

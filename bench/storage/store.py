@@ -53,6 +53,7 @@ class _Facts:
     revision: str
     notes: tuple[str, ...]
     statistics: Mapping[str, float]
+    collection: str = ""
 
 
 @dataclass(frozen=True)

@@ -26,15 +26,16 @@ _TIMEOUT = 60.0  # seconds without a byte
 
 @dataclass(frozen=True)
 class Archive:
-    """A ``.tar.gz`` on a server, with its hash and its size in bytes."""
+    """A file on a server, with its hash, its size in bytes, and its name here where that is another than there."""
 
     url: str
     sha256: str
     size: int
+    name: str = ""
 
 
 def download(archive: Archive, folder: Path, progress: bool) -> Path:
-    """Bring an archive into a folder, going on from where an earlier attempt stopped.
+    """Bring a file into a folder, going on from where an earlier attempt stopped.
 
     pooch checks a hash but starts every download anew; this one asks the server for the rest (HTTP Range). Proxies
     are those of the environment: ``http_proxy``, ``https_proxy``, ``no_proxy``.
@@ -48,7 +49,7 @@ def download(archive: Archive, folder: Path, progress: bool) -> Path:
     import http.client
     import urllib.error
 
-    path = folder / archive.url.rsplit("/", 1)[-1]
+    path = folder / (archive.name or archive.url.rsplit("/", 1)[-1])
     if path.is_file():  # by hand, or by an attempt that could not unpack it
         if sha256_of(path) == archive.sha256:
             return path

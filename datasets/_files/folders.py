@@ -2,10 +2,10 @@
 
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
-from bench import InputError
+from bench import InputError, suggestion
 
 VARIABLE = "ROTSYNC_DATA_DIR"
 
@@ -31,6 +31,44 @@ def roots(data_dir: Path | None) -> list[Path]:
         if not folder.is_dir():
             raise InputError(f"{folder}: {what} is not a folder; name one that exists")
     return [*folders.values(), cache()]
+
+
+def places(data_dir: Path | None, *below: str) -> list[Path]:
+    """Every one of the `roots`, each followed by its usual folders below; not all of them need exist."""
+    return [folder for root in roots(data_dir) for folder in (root, *(root / name for name in below))]
+
+
+def named(folders: Iterable[Path], patterns: Collection[str]) -> dict[str, Path]:
+    """Files that match one of the patterns, by their names without ending, sorted; of two the one found first."""
+    found: dict[str, Path] = {}
+    for folder in folders:
+        for pattern in patterns:
+            for path in folder.glob(pattern):
+                found.setdefault(path.stem, path)
+    return dict(sorted(found.items()))
+
+
+def chosen(name: str | None, known: Iterable[str], what: str) -> list[str]:
+    """The one that is asked for, or all, sorted.
+
+    Parameters
+    ----------
+    name
+        None for all.
+    known
+        What there is, on disk or in public.
+    what
+        What they are, for the message: ``scene of 1dsfm``.
+
+    Raises
+    ------
+    InputError
+        Where it is not among them.
+    """
+    names = sorted(set(known))
+    if name is not None and name not in names:
+        raise InputError(f"there is no {what} '{name}'{suggestion(name, names)}")
+    return names if name is None else [name]
 
 
 def revision(files: Iterable[Path], *parameters: str) -> str:

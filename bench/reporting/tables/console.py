@@ -15,7 +15,7 @@ from bench.reporting.tables.printed import area, degrees, exact_seconds, seconds
 from bench.reporting.tables.rows import ROC_LEGEND, TIE_LEGEND, Entry, Scene, Ties, is_timed, scenes, times_note
 
 NO_TRUTH = " · no ground truth: edge residuals, not errors"
-WIDE = 96  # columns from which the 90th percentile and the share under 5 degrees fit
+WIDE = 98  # columns from which the 90th percentile and the shares under 5 and 10 degrees fit
 
 
 def render_console(
@@ -83,7 +83,7 @@ def _table(scene: Scene, entries: Iterable[Entry], width: int, timed: bool) -> T
         columns += [("solve_s", "median s"), ("min_s", "min s"), ("speedup", "times faster")]
     else:
         if scene.has_truth and width >= WIDE and not several:
-            columns += [("p90_deg", "p90 °"), ("within_5_deg", "<5°")]
+            columns += [("p90_deg", "p90 °"), ("within_5_deg", "<5°"), ("within_10_deg", "<10°")]
         if scene.has_roc:
             columns.append(("roc_auc", "AUC"))
         columns += [("solve_s", "time s"), ("peak_mib", "MiB")]
@@ -122,7 +122,7 @@ def _cell(entry: Entry, name: str, timed: bool) -> str:
         return speedup(entry)
     if timed and name in ("solve_s", "min_s"):
         return exact_seconds(value.mean)
-    if name == "within_5_deg":
+    if name.startswith("within"):
         return f"{100 * value.mean:.0f} %" if value.known else "–"
     if name == "solve_s":
         return seconds(value.mean)

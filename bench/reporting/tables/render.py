@@ -1,7 +1,7 @@
 """Tables of a scored run: for the terminal, for Markdown, for a paper, and the long one for a spreadsheet."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
 
@@ -11,6 +11,7 @@ from bench.reporting.tables.rows import Ties
 if TYPE_CHECKING:
     from bench.reporting.tables.grid import Grid
 
+By = Literal["scene", "collection"]
 FORMATS = ("console", "markdown", "csv", "latex")
 COLUMNS = (
     "dataset",
@@ -38,6 +39,7 @@ def render(
     footnotes: Sequence[str],
     style: str = "console",
     *,
+    by: By = "scene",
     width: int = 100,
     terminal: bool = False,
 ) -> tuple[str, tuple[str, ...]]:
@@ -47,9 +49,9 @@ def render(
     ----------
     frame
         Scored rows, one for each (scene, method, params, seed), with at least `COLUMNS` and ``title``. Used
-        where present: ``p90_deg, within_5_deg, residual_mean_deg, residual_median_deg, edges_percent,
-        hardness, roc_auc, notes`` and ``timing`` (True on rows of a timing run, which
-        then have ``rounds, baseline, min_s, speedup, speedup_low, speedup_high`` too).
+        where present: ``p90_deg, within_5_deg, within_10_deg, auc_1_deg, auc_5_deg, auc_10_deg, residual_mean_deg,
+        residual_median_deg, edges_percent, hardness, roc_auc, collection, notes`` and ``timing`` (True on rows of a
+        timing run, which then have ``rounds, baseline, min_s, speedup, speedup_low, speedup_high`` too).
     ties
         For each (dataset, instance, protocol) the (method, params) that cannot be told apart from the best.
     footnotes
@@ -57,6 +59,8 @@ def render(
     style
         One of `FORMATS`. ``csv`` is the long table, unrounded, `COLUMNS` first; the others draw seeds
         together.
+    by
+        A table of every scene, or of means over the scenes of every collection.
     width, terminal
         Columns of the console, and whether it understands escape codes.
 
@@ -70,6 +74,8 @@ def render(
     InputError
         On an unknown format.
     """
+    if by == "collection":
+        return _by_collection(frame, ties, footnotes, style, width, terminal)
     if style == "csv":
         ordered = [*COLUMNS, *(name for name in frame.columns if name not in COLUMNS)]
         return frame[ordered].to_csv(index=False), tuple(footnotes)
@@ -81,7 +87,25 @@ def render(
         from bench.reporting.tables.grid import grids
 
         return _written(grids(frame, ties), style, footnotes), ()
-    raise InputError(f"there is no table format '{style}'{suggestion(style, FORMATS)}")
+    raise _unknown(style)
+
+
+def _by_collection(
+    frame: pd.DataFrame, ties: Ties, footnotes: Sequence[str], style: str, width: int, terminal: bool
+) -> tuple[str, tuple[str, ...]]:
+    from bench.reporting.tables import collections
+
+    if style == "csv":
+        return collections.collection_table(frame, ties).to_csv(index=False), tuple(footnotes)
+    if style == "console":
+        return collections.render_collections(frame, ties, footnotes, width=width, terminal=terminal), ()
+    if style in ("markdown", "latex"):
+        return _written(collections.collection_grids(frame, ties), style, footnotes), ()
+    raise _unknown(style)
+
+
+def _unknown(style: str) -> InputError:
+    return InputError(f"there is no table format '{style}'{suggestion(style, FORMATS)}")
 
 
 def text_of(

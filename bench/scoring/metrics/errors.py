@@ -11,6 +11,7 @@ from bench.scoring.metrics.alignment import align
 
 TOGETHER = 10_000  # cameras aligned at once
 WITHIN_DEG = (1, 3, 5, 10, 30)
+AUC_DEG = (1, 5, 10)
 
 
 def camera_errors(rotations: Floats, truth: Floats, rule: str = "l1") -> Floats:
@@ -60,13 +61,14 @@ def summary(errors: Floats) -> dict[str, float]:
     -------
     dict
         ``mean_deg, median_deg, rms_deg, p90_deg, max_deg`` (the worst camera), ``within_{1,3,5,10,30}_deg``
-        in [0, 1], and the integer ``n_scored``. All but the last are NaN where nothing was scored.
+        in [0, 1], ``auc_{1,5,10}_deg`` (see `recall_auc`), and the integer ``n_scored``. All but the last are NaN where
+        nothing was scored.
     """
     scored = errors[np.isfinite(errors)]
     n_scored = len(scored)
     if n_scored == 0:
-        names = ("mean", "median", "rms", "p90", "max", *(f"within_{limit}" for limit in WITHIN_DEG))
-        return {f"{name}_deg": float("nan") for name in names} | {"n_scored": 0}
+        shares = (*(f"within_{limit}" for limit in WITHIN_DEG), *(f"auc_{limit}" for limit in AUC_DEG))
+        return {f"{name}_deg": np.nan for name in ("mean", "median", "rms", "p90", "max", *shares)} | {"n_scored": 0}
     return {
         "mean_deg": float(scored.mean()),
         "median_deg": float(np.median(scored)),
@@ -74,8 +76,18 @@ def summary(errors: Floats) -> dict[str, float]:
         "p90_deg": float(np.percentile(scored, 90)),
         "max_deg": float(scored.max()),
         **{f"within_{limit}_deg": float((scored < limit).mean()) for limit in WITHIN_DEG},
+        **{f"auc_{limit}_deg": recall_auc(scored, limit) for limit in AUC_DEG},
         "n_scored": n_scored,
     }
+
+
+def recall_auc(errors: Floats, limit_deg: float) -> float:
+    """Area under the recall curve of errors (n,) in degrees up to a limit, divided by it: in [0, 1], 1 being exact.
+
+    Recall at an angle is the share of the errors below it. The area is that of the step function itself, the mean of
+    max(0, 1 - error / limit), and not that of a polygon or histogram, which depend on where they are sampled.
+    """
+    return float(np.maximum(1 - errors / limit_deg, 0).mean())
 
 
 def edge_metrics(problem: Problem, rotations: Floats, truth: Floats | None = None) -> dict[str, float]:
