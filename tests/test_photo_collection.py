@@ -3,6 +3,8 @@
 import importlib.metadata
 import os
 import typing
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from scipy.optimize import least_squares
 
 from bench.core import so3
 from bench.core.errors import InputError
-from bench.core.problem import Floats
+from bench.core.problem import Floats, Instance, Problem
 from bench.datasets import photo_collection
 from bench.datasets._files.kept import keep, kept
 from bench.datasets._simulated.photo.cameras import Cameras, looking
@@ -23,7 +25,10 @@ from bench.datasets._simulated.photo.precision import precision
 from bench.datasets._simulated.photo.surfaces import hidden, walls
 from bench.datasets._simulated.photo.views import in_view
 from bench.datasets.photo_collection import PhotoCollection
+from bench.plugins.catalog import catalog
 from bench.plugins.declare import Missing
+from bench.running.conformance_datasets import CHECKS, check_dataset
+from bench.storage.store import Store
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -170,7 +175,7 @@ def test_the_seed_decides_and_not_the_cores(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_gravity_is_that_of_the_truth_but_for_its_noise() -> None:
     estimated()
-    instance = load(PhotoCollection(n=10, features=1000, gravity_deg=0.0))
+    instance = load(replace(SMALL, gravity_deg=0.0))
     assert instance.truth is not None
     assert instance.problem.gravity is not None
     np.testing.assert_allclose(instance.problem.gravity, instance.truth @ [0.0, 0, -1], atol=1e-12)
@@ -214,9 +219,23 @@ def test_a_collection_is_made_once_and_then_needs_no_pycolmap(monkeypatch: pytes
     assert missing.how("photo-collection") == "python -m pip install pycolmap"
 
 
+def test_a_run_keeps_which_outliers_are_coherent(tmp_path: Path) -> None:
+    coherent = np.arange(3) > 1
+    problem = Problem(3, np.array([[0, 1], [0, 2], [1, 2]]), np.tile(np.eye(3), (3, 1, 1)))
+    store = Store(tmp_path / "run")
+    store.add_instance("key", Instance(problem, None, "three", outliers=coherent, coherent=coherent))
+    np.testing.assert_array_equal(store.instance("key").coherent, coherent)
+
+
 def test_pictures_of_nothing_in_common_are_refused() -> None:
     with pytest.raises(InputError, match="no two of these pictures match; choose a larger n, or more features"):
         load(PhotoCollection(n=2, features=50))
+
+
+def test_the_dataset_conforms() -> None:
+    estimated()
+    found = list(check_dataset(*catalog("dataset").one("photo-collection[n=8,features=800]")))
+    assert [f.result for f in found] == ["passed"] * len(CHECKS)
 
 
 def test_parameter_sets_have_their_own_name() -> None:
@@ -224,8 +243,8 @@ def test_parameter_sets_have_their_own_name() -> None:
     assert the_source(PhotoCollection("orbit", 30, exif=1.0)).name == "orbit-n30-exif1.0"
 
 
-def test_damaged_files_are_as_if_there_were_none(elsewhere: "os.PathLike[str]") -> None:
-    path = photo_collection.cache() / "x.npz"
+def test_damaged_files_are_as_if_there_were_none(elsewhere: Path) -> None:
+    path = elsewhere / "x.npz"
     keep(path, {"a": np.arange(3)})
     found = kept(path, ("a",))
     assert found is not None
