@@ -50,9 +50,9 @@ class PhotoCollection:
     of the world: a fold.
 
     Edges come with inlier counts as weights, with precisions from the Jacobian of the Sampson errors (for ranking:
-    they know nothing of wrong focal lengths, and their sigmas are several times too small), and with gravity. Axes of
-    cameras are COLMAP's: x right, y down, z forward. Outliers are edges over 20 degrees off, the bound of Purkait et
-    al. (2020); `Instance.coherent` tells those that most of the inliers owe to a repetition.
+    they know nothing of wrong focal lengths, and their sigmas are about three times too small), and with gravity.
+    Axes of cameras are COLMAP's: x right, y down, z forward. Outliers are edges over 20 degrees off, the bound of
+    Purkait et al. (2020); `Instance.coherent` tells those most of whose inliers are matches with a repetition.
 
     What differs from photographs: features are points on rectangles with a clustered relief, not texture; there is no
     image, hence no descriptor, and repetitions are exact; the principal point is in the centre, and nobody cropped;
@@ -94,7 +94,7 @@ class PhotoCollection:
     """
 
     layout: Layout = "facade"
-    n: int = parameter(200, at_least=2, at_most=2000)
+    n: int = parameter(200, at_least=2, at_most=1000)
     focal_error: float = parameter(0.2, at_least=0, at_most=1)
     exif: float = parameter(0.4, at_least=0, at_most=1)
     distortion: float = parameter(0.08, at_least=0, at_most=0.3)

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import os
+import time
 import typing
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from bench.core.errors import InputError
 from bench.core.problem import Floats, Instance, Problem
 from bench.datasets import photo_collection
 from bench.datasets._files.kept import keep, kept
+from bench.datasets._simulated.photo import collection
 from bench.datasets._simulated.photo.cameras import Cameras, looking
 from bench.datasets._simulated.photo.collection import Physics, _overlapping, _shoot
 from bench.datasets._simulated.photo.layouts import Layout, arrange
@@ -171,6 +173,22 @@ def test_the_seed_decides_and_not_the_cores(monkeypatch: pytest.MonkeyPatch) -> 
     other = load(SMALL, seed=1)
     assert one.revision == same.revision != other.revision
     assert (one.problem.m, one.problem.n) != (other.problem.m, other.problem.n) or (one.truth != other.truth).any()
+
+
+def test_who_interrupts_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[tuple[int, int]] = []
+
+    def measure(_: object, pair: tuple[int, int]) -> None:
+        time.sleep(0.05)
+        tried.append(pair)
+
+    def interrupt(done: int, total: int) -> None:
+        raise KeyboardInterrupt(total)
+
+    monkeypatch.setattr(collection._Shooting, "measure", measure)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        collection.collect(Physics.of(replace(SMALL, n=20)), 0, interrupt)
+    assert len(tried) < caught.value.args[0] / 2
 
 
 def test_gravity_is_that_of_the_truth_but_for_its_noise() -> None:

@@ -94,11 +94,14 @@ def collect(physics: Physics, seed: int, progress: Callable[[int, int], None]) -
     shooting = _shoot(physics, seed)
     pairs = _overlapping(shooting.views)
     measured: dict[tuple[int, int], _Edge] = {}
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    pool = ThreadPoolExecutor(os.cpu_count())
+    try:
         for done, (pair, edge) in enumerate(zip(pairs, pool.map(shooting.measure, pairs), strict=True), 1):
             progress(done, len(pairs))
             if edge is not None:
                 measured[pair] = edge
+    finally:
+        pool.shutdown(cancel_futures=True)  # who interrupts does not wait for the rest
     if not measured:
         raise InputError("no two of these pictures match; choose a larger n, or more features")
     return _largest(measured, shooting.cameras.rotations)

@@ -105,10 +105,10 @@ def _rooms(n: int, rng: np.random.Generator) -> Place:
     low = size * np.column_stack([room % 3, room // 3])
     ground = low + size * rng.uniform(0.12, 0.88, (n, 2))
     inwards = low + size / 2 - ground
-    heading = np.arctan2(inwards[:, 1], inwards[:, 0]) + np.radians(45) * rng.standard_normal(n)
+    heading = np.arctan2(inwards[:, 1], inwards[:, 0]) + np.radians(35) * rng.standard_normal(n)
     centres = np.column_stack([ground, rng.uniform(1.3, 1.8, n)])
     ahead = np.column_stack([_circle(heading), 0.1 * rng.standard_normal(n)])
-    return Place(surfaces, [(0, 21), (2, 23)], centres, centres + 3 * ahead, 3.5, (50.0, 75.0))
+    return Place(surfaces, [(0, 21), (2, 23)], centres, centres + 3 * ahead, 3.5, (65.0, 90.0))
 
 
 def _orbit(n: int, rng: np.random.Generator) -> Place:
