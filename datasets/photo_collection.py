@@ -95,13 +95,13 @@ class PhotoCollection:
 
     layout: Layout = "facade"
     n: int = parameter(200, at_least=2, at_most=1000)
-    focal_error: float = parameter(0.2, at_least=0, at_most=1)
-    exif: float = parameter(0.4, at_least=0, at_most=1)
+    focal_error: float = parameter(0.3, at_least=0, at_most=1)
+    exif: float = parameter(0.7, at_least=0, at_most=1)
     distortion: float = parameter(0.08, at_least=0, at_most=0.3)
     noise_px: float = parameter(0.8, at_least=0, at_most=10)
     features: int = parameter(4000, at_least=50, at_most=20_000)
     mismatches: float = parameter(20.0, at_least=0, at_most=500)
-    one_sided: float = parameter(0.7, at_least=0, at_most=1)
+    one_sided: float = parameter(0.8, at_least=0, at_most=1)
     repeated: float = parameter(0.06, at_least=0, at_most=1)
     inliers: int = parameter(15, at_least=8, at_most=1000)
     gravity_deg: float = parameter(1.0, at_least=0, at_most=90)
