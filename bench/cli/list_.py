@@ -47,7 +47,7 @@ def _list_plugins(kind: str, plugins: list[Path]) -> None:
     found = catalog(kind, plugins)
     for info in sorted(found, key=lambda info: info.name):
         state = f"   not installed: {info.install_hint()}" if info.not_installed() else ""
-        typer.echo(f"{info.name:<15} {info.summary}{state}")
+        typer.echo(f"{info.name:<16} {info.summary}{state}")
         details = [selection.format_selection("defaults", info.defaults())]
         details += [f"cite {info.cite}"] if info.cite else []
         details += [
@@ -56,6 +56,6 @@ def _list_plugins(kind: str, plugins: list[Path]) -> None:
         details += [f"uses {', '.join(info.facts['uses'])}"] if info.facts.get("uses") else []
         if info.facts.get("max_cameras"):
             details.append(f"up to {info.facts['max_cameras']} cameras")
-        typer.echo(f"{'':<15}   {'; '.join(details)}")
+        typer.echo(f"{'':<16}   {'; '.join(details)}")
     for why in found.broken.values():
         typer.echo(f"broken: {why}")

@@ -215,6 +215,8 @@ class Instance:
         (n, 3, 3), NaN where unknown; None where nothing is known.
     outliers
         (m,) True on edges whose measurement is an outlier; None unless simulated.
+    coherent
+        (m,) True on outliers that agree with each other, such as those of a repeated facade; None unless simulated.
     name
         Name of the instance within its dataset.
     protocol
@@ -244,6 +246,7 @@ class Instance:
     statistics: Mapping[str, float] = field(default_factory=dict)
     ids: NDArray[np.int64] | None = None
     collection: str = ""
+    coherent: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, eq=False)

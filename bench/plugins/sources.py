@@ -58,7 +58,7 @@ def _what_is_wrong(instance: object) -> str:
     if not (isinstance(instance, Instance) and isinstance(instance.problem, Problem)):
         return f"is {type(instance).__name__}, not an Instance with a Problem"
     n, m = instance.problem.n, instance.problem.m
-    wanted = {"truth": (n, 3, 3), "outliers": (m,)}
+    wanted = {"truth": (n, 3, 3), "outliers": (m,), "coherent": (m,)}
     for name, shape in wanted.items():
         given = getattr(instance, name)
         if given is not None and np.shape(given) != shape:

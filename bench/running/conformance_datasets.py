@@ -213,7 +213,8 @@ def _median_deg(instance: Instance, edges: Any, truth: Floats) -> float:
 def _digest(instance: Instance) -> str:
     """Hash of every array of an instance."""
     arrays = [getattr(instance.problem, field.name) for field in dataclasses.fields(instance.problem)]
-    made = [b"" if a is None else np.asarray(a).tobytes() for a in (*arrays, instance.truth, instance.outliers)]
+    known = (instance.truth, instance.outliers, instance.coherent)
+    made = [b"" if a is None else np.asarray(a).tobytes() for a in (*arrays, *known)]
     return hashlib.sha256(b"\0".join(made)).hexdigest()
 
 

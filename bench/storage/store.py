@@ -40,6 +40,7 @@ from bench.suite.plan import Job, Plan, decode, encode, newest
 
 VERSION = "schema.json"
 ASIDE = "damaged"  # where what cannot be read is moved
+_HIDDEN = ("truth", "outliers", "ids", "coherent")  # of an instance: in a file that no method is given
 AGAIN = "run the same command again"
 
 
@@ -123,7 +124,7 @@ class Store:
             return
         with self.work_folder() as work, _writing(final):
             save_problem(work / "problem.npz", instance.problem)
-            hidden: dict[str, Any] = {"truth": instance.truth, "outliers": instance.outliers, "ids": instance.ids}
+            hidden: dict[str, Any] = {name: getattr(instance, name) for name in _HIDDEN}
             with (work / "truth.npz").open("wb") as file:
                 np.savez(file, **{name: value for name, value in hidden.items() if value is not None})
             facts = {f.name: getattr(instance, f.name) for f in fields(_Facts)}
@@ -158,13 +159,18 @@ class Store:
         folder = self.folder / "instances" / key
         with _reading(folder, f"run the same command again, or see: {program()} doctor {self.folder} --repair"):
             problem = load_problem(folder / "problem.npz")
-            hidden = archive.load(folder / "truth.npz", ("truth", "outliers", "ids"))
-            shapes = {"truth": (problem.n, 3, 3), "outliers": (problem.m,), "ids": (problem.n,)}
+            hidden = archive.load(folder / "truth.npz", _HIDDEN)
+            shapes = {
+                "truth": (problem.n, 3, 3),
+                "outliers": (problem.m,),
+                "ids": (problem.n,),
+                "coherent": (problem.m,),
+            }
             if any(values.shape != shapes[name] for name, values in hidden.items()):
                 raise ValueError("truth.npz does not fit problem.npz")
             facts = typed.read(_Facts, read_json(folder / "instance.json"), "instance.json")
-            truth, outliers, ids = (hidden.get(name) for name in ("truth", "outliers", "ids"))
-            return Instance(problem, truth, outliers=outliers, ids=ids, **vars(facts))
+            known: dict[str, Any] = {name: hidden.get(name) for name in _HIDDEN}
+            return Instance(problem, **known, **vars(facts))
 
     def record(self, job_id: str) -> Record | None:
         """Record of a job, or None where there is none.
