@@ -10,9 +10,10 @@ from bench.formats.npz import read_topology
 
 from ._files.folders import revision, roots
 from ._simulated import correlated
-from ._simulated.correlated import Law, check_given
+from ._simulated.correlated import Law
 from ._simulated.measurements import CODE, Measurements, OutlierModel
 from ._simulated.noise import Noise
+from ._simulated.sizes import Sizes
 from ._simulated.statistics import statistics
 
 FOLDER = "viewgraphs"
@@ -55,7 +56,8 @@ class ViewGraph:
         if self.scene is not None and Path(self.scene).name != self.scene:
             raise ValueError(f"scene is a name without folders and without .npz, not '{self.scene}'")
         if self.noise == "correlated":
-            check_given(self.noise_deg, self.outliers)
+            given = {"median_deg": self.noise_deg, "outliers": self.outliers}
+            Sizes(**{name: value for name, value in given.items() if value is not None})
             if self.outlier_model is not None:
                 raise ValueError("'outlier_model' has no meaning for noise=correlated")
 

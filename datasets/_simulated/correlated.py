@@ -6,7 +6,7 @@ a camera that is bad has many bad edges. The shape of this law and its ranges we
 is known for a part, and on Union Square, measured against an estimate; on no other scene.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,38 +14,63 @@ from numpy.typing import NDArray
 
 from bench import Floats, Ints, so3
 
-from . import folds, upright
+from . import draws, folds, upright
+from . import overlap as overlaps
+from . import sizes as size_laws
+from .draws import Draw, chunks, relative, units
 from .folds import Fold
+from .overlap import overlap
+from .sizes import OUTLIER_DEG, Sizes
 from .upright import Upright, smooth_function
 
-CODE = tuple(Path(str(file)) for file in (__file__, folds.__file__, upright.__file__))  # decides what is simulated
-
-OUTLIER_DEG = 20.0  # an edge that is wrong by more counts as an outlier
-_CHUNK = 1 << 19  # edges measured at a time, so that memory beyond the result stays bounded
+_MODULES = (draws, folds, overlaps, size_laws, upright)
+CODE = tuple(Path(str(file)) for file in (__file__, *(m.__file__ for m in _MODULES)))  # decides what is simulated
 _NEAR = np.radians(2.0)  # added to an angle before its logarithm is taken
+_RISE = 0.25  # of the logarithm of the coherence with the latent quality
+_ONE_SIDED = 0.5  # standard deviation of the logarithm of how one-sided cameras are
+
+# From which the parameters of a graph are drawn: about twice as wide as what Madrid Metropolis and Union Square show.
+_RANGES = {
+    "camera": (0.2, 0.45),
+    "angle": (0.04, 0.22),
+    "overlap": (0.02, 0.15),
+    "likeness": (0.03, 0.17),
+    "coherence": (0.15, 0.6),
+    "tilt": (0.3, 0.9),
+    "roll": (0.1, 0.3),
+    "isotropic": (0.0, 0.3),
+    "to_identity": (0.0, 0.15),
+    "warp_deg": (0.2, 0.9),
+    "noise_deg": (0.15, 0.6),
+}
 
 
 @dataclass(frozen=True)
 class Law:
     """The law of correlated errors, of one graph.
 
-    Edge (i, j) measures exp(b) R_i R_j^T, with b in the frame of camera i (x right, y up, z along the optical axis).
+    Edge (i, j) measures exp(b + c) S_i S_j^T, in the frame of camera i (x right, y up, z along the optical axis). The
+    small c is normal, with standard deviation `noise_deg` times axes = (tilt, 1, roll), and independent of all else.
 
-    The **size** of b grows with a latent quality z: sqrt(camera / 2) (q_i + q_j) + sqrt(angle) a_ij + sqrt(rest) e_ij,
-    where q are the cameras' (exponential, centred), a is the standardised logarithm of the true angle, e is the
-    edge's own, and camera + angle + rest = 1. Below the median the size is log-normal with standard deviation
-    `spread`; above it with the one that makes the share beyond 20 degrees exactly `outliers`. What exceeds half a turn
-    wraps around.
+    S_i = R_i exp(w_i) is the camera as the edges agree that it is. The **warp** w_i, of median length `warp_deg`, is a
+    linear function of three numbers of the camera (f_i below, and a smooth function on the graph), so that cameras
+    whose edges are good are turned alike: triangles do not see it, and no method can undo it.
 
-    Its **direction** is that of axes * (w_ij + coherence (g_i d_i - R_i R_j^T g_j d_j)): w is the edge's own, d is a
-    unit vector of each camera, and g (log-normal, 0.5) says how one-sided the camera is. Of the outliers, the share
-    `isotropic` has any axis instead, and `to_identity` errs along the geodesic to the identity.
+    The **size** of b grows with a latent quality z of variance 1, a sum of independent parts whose variances add up:
+    `camera`: (q_i + q_j) / sqrt 2 with q the cameras' (exponential); `angle`: the logarithm of the true angle;
+    `overlap`: less where the neighbourhoods of i and j have more in common; `likeness`: less where f_i . f_j is larger,
+    with f, two normal numbers for each camera, what a photograph looks like, so that cameras fall into groups that
+    match well among themselves; the rest is the edge's own. `sizes` says which z has which size.
+
+    Its **direction** is that of axes * e_ij + coherence exp(z / 4) (g_i d_i - R_i R_j^T g_j d_j): e is the edge's own,
+    d is a unit vector of each camera, weighted by axes, and g (log-normal, 0.5) says how one-sided the camera is. Of
+    the outliers, the share `isotropic` has any axis instead, and `to_identity` errs along the geodesic to the identity.
 
     Parameters
     ----------
-    median_deg, outliers, spread
-        Of the sizes: see above. `outliers` is below a half, and leaves out the edges of a fold.
-    camera, angle
+    sizes
+        Distribution of the sizes.
+    camera, angle, overlap, likeness
         Shares of the variance of the latent quality.
     coherence
         How much of an error's direction is the camera's.
@@ -53,53 +78,42 @@ class Law:
         Size of the errors about the camera's x and z axes, relative to those about y (the pan).
     isotropic, to_identity
         Shares of the outliers.
+    warp_deg, noise_deg
+        See above.
     cameras
         How the cameras are turned.
     fold
         A part of the scene that hangs on to the rest by edges that are wrong all in the same way; None for none.
     """
 
-    median_deg: float = 4.0
-    outliers: float = 0.15
-    spread: float = 1.4
+    sizes: Sizes = field(default_factory=Sizes)
     camera: float = 0.35
-    angle: float = 0.12
-    coherence: float = 0.5
+    angle: float = 0.14
+    overlap: float = 0.1
+    likeness: float = 0.13
+    coherence: float = 0.33
     tilt: float = 0.6
     roll: float = 0.15
     isotropic: float = 0.1
     to_identity: float = 0.05
+    warp_deg: float = 0.45
+    noise_deg: float = 0.3
     cameras: Upright = field(default_factory=Upright)
     fold: Fold | None = None
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, median_deg: float | None = None, outliers: float | None = None) -> "Law":
-        """A law with every parameter from a range about twice as wide as what two real scenes show.
-
-        Parameters
-        ----------
-        median_deg, outliers
-            Instead of those drawn.
-        """
-        ranges = {
-            "median_deg": (1.5, 8.0),
-            "outliers": (0.04, 0.35),
-            "spread": (1.1, 1.7),
-            "camera": (0.2, 0.5),
-            "angle": (0.03, 0.25),
-            "coherence": (0.2, 0.8),
-            "tilt": (0.3, 0.9),
-            "roll": (0.1, 0.3),
-            "isotropic": (0.0, 0.3),
-            "to_identity": (0.0, 0.15),
-        }
-        values = {
-            name: float(np.exp(rng.uniform(*np.log(ends)))) if name == "median_deg" else float(rng.uniform(*ends))
-            for name, ends in ranges.items()
-        }
+        """A law with every parameter from its range, but for the median error and the share of outliers given."""
+        values = {name: float(rng.uniform(*ends)) for name, ends in _RANGES.items()}
+        sizes = Sizes.drawn(rng)
         given = {"median_deg": median_deg, "outliers": outliers}
-        values |= {name: value for name, value in given.items() if value is not None}
-        return cls(**values, cameras=Upright.drawn(rng), fold=Fold.drawn(rng))
+        sizes = replace(sizes, **{name: value for name, value in given.items() if value is not None})
+        return cls(sizes, **values, cameras=Upright.drawn(rng), fold=Fold.drawn(rng))
+
+    @classmethod
+    def independent(cls, sizes: Sizes, cameras: Upright) -> "Law":
+        """The contrast: nothing that edges share, and errors about the same axes."""
+        return cls(sizes, 0, 0, 0, 0, coherence=0, warp_deg=0, cameras=cameras)
 
     def simulate(self, n: int, edges: Ints, rng: np.random.Generator) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Cameras and measurements on a graph, at a cost linear in its edges.
@@ -115,90 +129,71 @@ class Law:
             Truth (n, 3, 3), measured rotations (m, 3, 3), and the mask (m,) of the edges that are wrong by more than
             20 degrees.
         """
+        draw = self.draw(n, edges, rng)
+        rotations = np.empty((len(edges), 3, 3))
+        outliers = np.empty(len(edges), dtype=bool)
+        sizes = self.sizes.of(draw.quality)
+        for part in chunks(len(edges)):
+            rotations[part] = draw.measured(sizes, part)
+        if self.fold is not None:
+            self.fold.apply(draw.smooth, draw.truth, edges, rotations, rng)
+        for part in chunks(len(edges)):
+            wrong = so3.angle_between(rotations[part], relative(draw.truth, edges[part]))
+            outliers[part] = wrong > np.radians(OUTLIER_DEG)
+        return draw.truth, rotations, outliers
+
+    def draw(self, n: int, edges: Ints, rng: np.random.Generator) -> Draw:
+        """Everything that is random but the fold."""
         smooth = smooth_function(n, edges, rng)
         truth = self.cameras.rotations(smooth, rng)
-        rotations = self.measure(truth, edges, rng)
-        if self.fold is not None:
-            self.fold.apply(smooth, truth, edges, rotations, rng)
-        outliers = np.empty(len(edges), dtype=bool)
-        for part in _parts(len(edges)):
-            wrong = so3.angle_between(rotations[part], _relative(truth, edges[part]))
-            outliers[part] = wrong > np.radians(OUTLIER_DEG)
-        return truth, rotations, outliers
-
-    def measure(self, truth: Floats, edges: Ints, rng: np.random.Generator) -> Floats:
-        """Measured rotations (m, 3, 3) on `edges` (m, 2) of cameras (n, 3, 3), without the fold."""
-        n, m = len(truth), len(edges)
-        sizes = self._sizes(truth, edges, rng)
-        one_sided = _units(self._axes * rng.standard_normal((n, 3))) * np.exp(0.5 * rng.standard_normal((n, 1)))
-        kinds = np.where(sizes > np.radians(OUTLIER_DEG), rng.random(m), 1.0)
-        rotations = np.empty((m, 3, 3))
-        for part in _parts(m):
-            relative = _relative(truth, edges[part])
-            directions = self._directions(one_sided, edges[part], relative, kinds[part], rng)
-            rotations[part] = so3.exp(sizes[part, None] * directions) @ relative
-        return rotations
+        looks = rng.standard_normal((n, 2))
+        warp = np.column_stack([looks, smooth]) @ rng.standard_normal((3, 3)) * np.array([self.tilt, 1, self.tilt])
+        warp *= np.radians(self.warp_deg) / np.median(np.linalg.norm(warp, axis=1))
+        seen = truth @ so3.exp(warp)
+        quality = self._quality(seen, looks, edges, rng)
+        directions, outlying = self._directions(seen, quality, edges, rng)
+        noise = np.radians(self.noise_deg) * self._axes * rng.standard_normal((len(edges), 3))
+        return Draw(smooth, truth, seen, edges, quality, directions, outlying, noise)
 
     @property
     def _axes(self) -> Floats:
         return np.array([self.tilt, 1.0, self.roll])
 
-    def _sizes(self, truth: Floats, edges: Ints, rng: np.random.Generator) -> Floats:
-        """Angles (m,) by which the measurements are wrong, radians, not yet wrapped."""
+    def _quality(self, cameras: Floats, looks: Floats, edges: Ints, rng: np.random.Generator) -> Floats:
+        """Latent quality (m,); the larger, the worse."""
+        n, m = len(cameras), len(edges)
         i, j = edges.T
-        quality = rng.standard_exponential(len(truth)) - 1
-        angles = np.concatenate([so3.angle(_relative(truth, edges[part])) for part in _parts(len(edges))])
-        wide = np.log(angles + _NEAR)
-        wide = (wide - wide.mean()) / (wide.std() or 1.0)
-        rest = np.sqrt(1 - self.camera - self.angle) * rng.standard_normal(len(edges))
-        z = np.sqrt(self.camera / 2) * (quality[i] + quality[j]) + np.sqrt(self.angle) * wide + rest
-        z -= np.median(z)
-        beyond = np.quantile(z, 1 - self.outliers)
-        above = np.log(OUTLIER_DEG / self.median_deg) / beyond if beyond > 0 else 0.0
-        return np.asarray(np.radians(self.median_deg) * np.exp(np.where(z < 0, self.spread, above) * z))
+        own = rng.standard_exponential(n)
+        angles = np.concatenate([so3.angle(relative(cameras, edges[part])) for part in chunks(m)])
+        rest = 1 - self.camera - self.angle - self.overlap - self.likeness
+        return np.asarray(
+            np.sqrt(self.camera) * _standard(own[i] + own[j])
+            + np.sqrt(self.angle) * _standard(np.log(angles + _NEAR))
+            - np.sqrt(self.overlap) * _standard(overlap(n, edges, rng))
+            - np.sqrt(self.likeness) * _standard(np.einsum("ek,ek->e", looks[i], looks[j]))
+            + np.sqrt(rest) * rng.standard_normal(m)
+        )
 
     def _directions(
-        self, one_sided: Floats, edges: Ints, relative: Floats, kinds: Floats, rng: np.random.Generator
-    ) -> Floats:
-        """Unit vectors (k, 3) about which the measurements of k edges are wrong.
-
-        Parameters
-        ----------
-        one_sided
-            (n, 3) g d of every camera.
-        kinds
-            (k,) uniform on [0, 1) on outliers, which it tells apart; 1 elsewhere.
-        """
-        i, j = edges.T
-        own = rng.standard_normal((len(edges), 3))
-        shared = one_sided[i] - np.einsum("kab,kb->ka", relative, one_sided[j])
-        directions = _units(self._axes * own + self.coherence * shared)
-        isotropic = kinds < self.isotropic
-        directions[isotropic] = _units(own[isotropic])
-        back = (kinds >= self.isotropic) & (kinds < self.isotropic + self.to_identity)
-        directions[back] = -_units(so3.log(relative[back]))
-        return directions
+        self, cameras: Floats, quality: Floats, edges: Ints, rng: np.random.Generator
+    ) -> tuple[Floats, Floats]:
+        """Unit vectors (m, 3) about which edges are wrong, and those of the same edges were they outliers."""
+        n, m = len(cameras), len(edges)
+        one_sided = np.exp(_ONE_SIDED * rng.standard_normal((n, 1))) * units(self._axes * rng.standard_normal((n, 3)))
+        directions, outlying = np.empty((m, 3)), np.empty((m, 3))
+        for part in chunks(m):
+            i, j = edges[part].T
+            turn = relative(cameras, edges[part])
+            own = rng.standard_normal((len(i), 3))
+            shared = one_sided[i] - np.einsum("eab,eb->ea", turn, one_sided[j])
+            directions[part] = units(self._axes * own + self.coherence * np.exp(_RISE * quality[part, None]) * shared)
+            kind = rng.random((len(i), 1))
+            back = -units(so3.log(turn))
+            special = np.where(kind < self.isotropic, units(own), back)
+            outlying[part] = np.where(kind < self.isotropic + self.to_identity, special, directions[part])
+        return directions, outlying
 
 
-def check_given(median_deg: float | None, outliers: float | None) -> None:
-    """Refuse a median error and a share of outliers that no law has; `ValueError`."""
-    if median_deg is not None and not 0 < median_deg < OUTLIER_DEG:
-        raise ValueError(
-            f"'noise_deg' must be above 0 and below {OUTLIER_DEG:g} for noise=correlated, not {median_deg}"
-        )
-    if outliers is not None and not outliers < 0.5:
-        raise ValueError(f"'outliers' must be below 0.5 for noise=correlated, not {outliers}")
-
-
-def _relative(rotations: Floats, edges: Ints) -> Floats:
-    i, j = edges.T
-    return rotations[i] @ np.swapaxes(rotations[j], -1, -2)
-
-
-def _units(vectors: Floats) -> Floats:
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(lengths > 0, lengths, 1.0)
-
-
-def _parts(m: int) -> list[slice]:
-    return [slice(start, start + _CHUNK) for start in range(0, m, _CHUNK)]
+def _standard(values: Floats) -> Floats:
+    """The values with mean 0 and variance 1, or 0 where all are equal."""
+    return (values - values.mean()) / (values.std() or 1.0)
