@@ -1,7 +1,7 @@
 """Statistical twins of measured graphs: their topology and the law of their errors, with a truth that is exact."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -9,6 +9,7 @@ from bench import InputError, Instance, Missing, Problem, Source, catalog, datas
 
 from ._files.folders import revision
 from ._simulated import correlated, fit
+from ._simulated.folds import Fold
 from ._simulated.statistics import statistics
 
 NOTE = "simulated measurements: a twin of {of}, whose topology is real; do not compare with published tables"
@@ -31,10 +32,14 @@ class Twin:
         folder. A dataset of several graphs gives a twin of each.
     errors
         ``correlated``; or ``independent``, the contrast: nothing that edges share, fitted in the same way.
+    fold
+        Whether a part of the cameras hangs on to the rest by edges that are wrong all in the same way, as in
+        ``view-graph[noise=correlated]``; they come on top of the errors fitted.
     """
 
     of: str = ""
     errors: Literal["correlated", "independent"] = "correlated"
+    fold: bool = False
 
     def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source | Missing]:
         """A twin of each graph, by its name.
@@ -58,8 +63,9 @@ class Twin:
 
     def _twin(self, measured: Source, seed: int) -> Source:
         files = [Path(__file__), Path(str(fit.__file__)), *correlated.CODE]
-        identity = revision(files, measured.revision, self.errors, str(seed))
-        name = measured.name if self.errors == "correlated" else f"{measured.name}-{self.errors}"
+        identity = revision(files, measured.revision, self.errors, str(self.fold), str(seed))
+        parts = [self.errors] * (self.errors != "correlated") + ["fold"] * self.fold
+        name = "-".join([measured.name, *parts])
         return Source(name, identity, lambda: self._load(measured, name, seed, identity), seeded=True)
 
     def _load(self, measured: Source, name: str, seed: int, identity: str) -> Instance:
@@ -67,6 +73,8 @@ class Twin:
         n, edges = of.problem.n, of.problem.edges
         rng = stream(seed, "data", "twin", measured.name)
         law, how = fit.fitted(of.problem, rng, correlated=self.errors == "correlated")
+        if self.fold:
+            law = replace(law, fold=Fold.drawn(rng))
         truth, rotations, outliers = law.simulate(n, edges, rng)
         problem = Problem(n, edges, rotations)
         return Instance(

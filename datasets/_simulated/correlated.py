@@ -27,6 +27,7 @@ _MODULES = (draws, folds, overlaps, size_laws, upright)
 CODE = tuple(Path(str(file)) for file in (__file__, *(m.__file__ for m in _MODULES)))  # decides what is simulated
 _NEAR = np.radians(2.0)  # added to an angle before its logarithm is taken
 _RISE = 0.25  # of the logarithm of the coherence with the latent quality
+_FOLDED = 0.5  # share of the graphs
 _ONE_SIDED = 0.5  # standard deviation of the logarithm of how one-sided cameras are
 
 # From which the parameters of a graph are drawn: about twice as wide as what Madrid Metropolis and Union Square show.
@@ -96,19 +97,20 @@ class Law:
     roll: float = 0.15
     isotropic: float = 0.1
     to_identity: float = 0.05
-    warp_deg: float = 0.45
+    warp_deg: float = 0.4
     noise_deg: float = 0.3
     cameras: Upright = field(default_factory=Upright)
     fold: Fold | None = None
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, median_deg: float | None = None, outliers: float | None = None) -> "Law":
-        """A law with every parameter from its range, but for the median error and the share of outliers given."""
+        """A law with every parameter from its range, but for what is given, and with a fold in half of the draws."""
         values = {name: float(rng.uniform(*ends)) for name, ends in _RANGES.items()}
         sizes = Sizes.drawn(rng)
         given = {"median_deg": median_deg, "outliers": outliers}
         sizes = replace(sizes, **{name: value for name, value in given.items() if value is not None})
-        return cls(sizes, **values, cameras=Upright.drawn(rng), fold=Fold.drawn(rng))
+        cameras, fold = Upright.drawn(rng), Fold.drawn(rng)
+        return cls(sizes, **values, cameras=cameras, fold=fold if rng.random() < _FOLDED else None)
 
     @classmethod
     def independent(cls, sizes: Sizes, cameras: Upright) -> "Law":
