@@ -49,7 +49,7 @@ def _series(
 
 
 def _correlations(found: Calibration) -> str:
-    ranks = found.rows[found.rows["group"] == RANKS]
+    ranks = found.rows[(found.rows["group"] == RANKS) & found.rows["bound"].notna()]
     means = ranks.groupby("law", sort=False)["simulated"].mean()
     told = [f"{law} {value:.2f}" for law, value in means.items()]
     return f"Mean rank correlation: {', '.join(told)}." if told else ""

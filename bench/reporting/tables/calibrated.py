@@ -25,7 +25,8 @@ def calibration_grid(found: Calibration) -> Grid:
         rows=tuple(rows),
         notes=(
             "Farthest: the largest factor between real and simulated; for coherence the largest difference; for ranks "
-            "Spearman's correlation of the methods by median error, of medians rounded to three digits.",
+            "Spearman's correlation of the methods by median error, rounded to three digits, of all and of the half "
+            "that is better on the real graph.",
             f"Agrees: within a factor of {FACTOR:g}, a difference of {DIFFERENCE:g}, a correlation of {CORRELATION:g} "
             "or more; of the rest nothing is asked.",
         ),
@@ -40,9 +41,10 @@ def verdicts(found: Calibration) -> list[str]:
 def _verdict(law: str, rows: pd.DataFrame) -> str:
     asked = rows[rows["agrees"].notna()]
     agreeing = int(asked["agrees"].astype(bool).sum())
-    correlations = rows.loc[rows["group"] == RANKS, "simulated"]
-    ranks = f"; mean rank correlation {correlations.mean():.2f}" if len(correlations) else ""
-    return f"{law}: {agreeing} of {len(asked)} quantities agree{ranks}"
+    ranks = rows[rows["group"] == RANKS]
+    means = ranks.groupby(ranks["name"].str.partition(" (")[0], sort=False)["simulated"].mean()
+    told = ", ".join(f"{name} {value:.2f}" for name, value in means.items())
+    return f"{law}: {agreeing} of {len(asked)} quantities agree{'; mean rank correlation: ' * bool(told)}{told}"
 
 
 def _row(place: tuple[str, str], group: str, rows: pd.DataFrame) -> tuple[tuple[str, ...], tuple[Cell, ...]]:
@@ -51,7 +53,7 @@ def _row(place: tuple[str, str], group: str, rows: pd.DataFrame) -> tuple[tuple[
     asked = rows["agrees"].dropna().astype(bool)
     word = ABSENT if asked.empty else f"{int(asked.sum())} of {len(asked)}"
     if group in (MEDIAN, RANKS):
-        shown = ("", _number(rows["simulated"].iloc[0])) if group == RANKS else ("", "")
+        shown = ("", _numbers(rows["simulated"]) if group == RANKS else "")
     else:
         shown = (_numbers(rows["real"]), _numbers(rows["simulated"]))
     failed = not asked.empty and not asked.all()

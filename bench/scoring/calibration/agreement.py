@@ -35,8 +35,8 @@ class Calibration:
     rows
         `COLUMNS`. A law is a dataset, with what its instances' names have beyond the real one's; `simulated` is the
         median over its instances, between `low` and `high`. `deviation` is the larger ratio of real and simulated, the
-        difference of coherences, or, in the group "ranks", Spearman's correlation of methods by median error. `agrees`
-        is None where no bound is asked for.
+        difference of coherences, or, in the group "ranks", Spearman's correlation of methods by median error: of all,
+        and of the half that is better on the real graph. `agrees` is None where no bound is asked for.
     medians
         For each law and real instance the medians of each method, real and simulated.
     """
@@ -147,8 +147,11 @@ def _rows(
     shares = [own / one.prints[typical] for own, one in zip(simulated_best, simulated, strict=True)]
     yield _row(BEST, MEDIAN, best, simulated_best, FACTOR, ratio=True)
     yield _row(BEST, OVER_EDGES, best / real.prints[typical], shares, None, ratio=True)
-    if len(methods) >= FEWEST:
-        yield _ranks(methods)
+    order = sorted(methods, key=lambda method: methods[method][0])
+    better = {method: methods[method] for method in order[: (len(order) + 1) // 2]}
+    for which, bound in ((methods, CORRELATION), (better, None)):
+        if len(which) >= FEWEST:
+            yield _ranks(which, "better half" if bound is None else "all methods", bound)
 
 
 def _row(
@@ -163,7 +166,7 @@ def _row(
     return (group, name, real, middle, low, high, deviation, bound, agrees)
 
 
-def _ranks(methods: Mapping[str, tuple[float, list[float]]]) -> tuple[object, ...]:
+def _ranks(methods: Mapping[str, tuple[float, list[float]]], name: str, bound: float | None) -> tuple[object, ...]:
     """Spearman's correlation of the methods' medians; real against the median over simulated instances, and each."""
     from scipy.stats import spearmanr
 
@@ -173,8 +176,8 @@ def _ranks(methods: Mapping[str, tuple[float, list[float]]]) -> tuple[object, ..
     real = [value for value, _ in methods.values()]
     each = [correlation(values) for values in zip(*(others for _, others in methods.values()), strict=True)]
     whole = correlation([float(np.median(others)) for _, others in methods.values()])
-    agrees = bool(whole >= CORRELATION) if np.isfinite(whole) else None
-    return (RANKS, f"{len(methods)} methods", 1.0, whole, min(each), max(each), whole, CORRELATION, agrees)
+    agrees = None if bound is None or not np.isfinite(whole) else bool(whole >= bound)
+    return (RANKS, f"{name} ({len(methods)})", 1.0, whole, min(each), max(each), whole, bound, agrees)
 
 
 def _short(value: float) -> float:
