@@ -32,6 +32,7 @@ OUT_OF_RANGE = {
         "erdos-renyi[noise_deg=-1]", "erdos-renyi[outliers=1.5]", "folded[n=3]", "folded[share=1.1]",
         "folded[agreeing=-0.1]", "folded[across=2]", "folded[missing=1.1]", "folded[angle_deg=181]",
         "folded[noise_deg=-1]", "view-graph[outliers=2]", "view-graph[noise_deg=181]",
+        "street-graph[n=1]", "street-graph[degree=1]", "street-graph[noise_deg=20]", "street-graph[outliers=0.5]",
     ],
 }  # fmt: skip
 
@@ -58,6 +59,13 @@ def test_what_is_not_a_number_is_out_of_range() -> None:
         ("method", "crdmf[device=cpu]", "'device' has no meaning for preset=thin"),
         ("method", "crdmf[preset=paper,init=spectral]", "'init' has no meaning for preset=paper"),
         ("dataset", "view-graph[scene=../Wheel]", "without folders"),
+        (
+            "dataset",
+            "view-graph[noise=correlated,outlier_model=haar]",
+            "'outlier_model' has no meaning for noise=correlated",
+        ),
+        ("dataset", "view-graph[noise=correlated,outliers=0.5]", "not below a half"),
+        ("dataset", "view-graph[noise=correlated,noise_deg=0]", "not above 0"),
         ("dataset", "pose-graph[graph=../secret]", "without folders"),
     ],
 )
