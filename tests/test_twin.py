@@ -101,7 +101,7 @@ def test_a_twin_of_nothing_is_refused(of: str, message: str) -> None:
 
 @pytest.mark.real_data
 def test_a_twin_of_ellis_island_has_the_errors_of_ellis_island(real_data: Path) -> None:
-    """A scene that the law was not set on: its truth is used here, and nowhere else."""
+    """A scene that served as a check as the law was made, and not to set it."""
     from bench.datasets.one_dsfm import OneDSfM
     from bench.scoring.calibration.fingerprint import ERROR, QUANTILES, fingerprint
 

@@ -3,7 +3,8 @@
 The independent models of `noise` give each edge an error of its own. On real scenes the errors at one camera point the
 same way (a wrong focal length, distortion, matches on one side), so that averaging many edges does not remove them, and
 a camera that is bad has many bad edges. The shape of this law and its ranges were set on Madrid Metropolis, whose truth
-is known for a part, and on Union Square, measured against an estimate; on no other scene.
+is known for a part, and on Union Square, measured against an estimate; other scenes served as checks (see
+results/reference/calibration).
 """
 
 from dataclasses import dataclass, field, replace
