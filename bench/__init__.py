@@ -2,7 +2,8 @@
 
 What there is for users: `run`, `solve`, `score`, `report`, `catalog`, `Problem`, `Estimate`, `Instance`. What a plug-in
 needs besides: `method`, `dataset`, `parameter`, `Checkpoint`, `Skipped`, `Source`, `Missing`, `InputError`,
-`suggestion`, `so3`, `stream`, and the array types `Floats` and `Ints`. Each is imported when it is first used.
+`suggestion`, `so3`, `stream`, `sample_triangles`, `closures`, and the array types `Floats` and `Ints`. Each is imported
+when it is first used.
 """
 
 from importlib import import_module
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from bench.core.problem import Problem as Problem
     from bench.core.problem import Skipped as Skipped
     from bench.core.seeds import stream as stream
+    from bench.core.triangles import closures as closures
+    from bench.core.triangles import sample_triangles as sample_triangles
     from bench.plugins.catalog import catalog as catalog
     from bench.plugins.configure import parameter as parameter
     from bench.plugins.declare import Missing as Missing
@@ -46,6 +49,7 @@ HOMES = {
     **dict.fromkeys(("InputError", "suggestion"), "bench.core.errors"),
     "stream": "bench.core.seeds",
     "so3": "bench.core.so3",
+    **dict.fromkeys(("closures", "sample_triangles"), "bench.core.triangles"),
 }
 __all__ = sorted(HOMES)
 

@@ -36,6 +36,7 @@ OUT_OF_RANGE = {
         "photo-collection[exif=2]", "photo-collection[distortion=1]", "photo-collection[noise_px=-1]",
         "photo-collection[features=1]", "photo-collection[mismatches=-1]", "photo-collection[one_sided=2]",
         "photo-collection[repeated=2]", "photo-collection[inliers=5]", "photo-collection[gravity_deg=-1]",
+        "street-graph[n=1]", "street-graph[degree=1]", "street-graph[noise_deg=20]", "street-graph[outliers=0.5]",
     ],
 }  # fmt: skip
 
@@ -62,6 +63,13 @@ def test_what_is_not_a_number_is_out_of_range() -> None:
         ("method", "crdmf[device=cpu]", "'device' has no meaning for preset=thin"),
         ("method", "crdmf[preset=paper,init=spectral]", "'init' has no meaning for preset=paper"),
         ("dataset", "view-graph[scene=../Wheel]", "without folders"),
+        (
+            "dataset",
+            "view-graph[noise=correlated,outlier_model=haar]",
+            "'outlier_model' has no meaning for noise=correlated",
+        ),
+        ("dataset", "view-graph[noise=correlated,outliers=0.5]", "not below a half"),
+        ("dataset", "view-graph[noise=correlated,noise_deg=0]", "not above 0"),
         ("dataset", "pose-graph[graph=../secret]", "without folders"),
         ("dataset", "registration[descriptor=../gt]", "without folders"),
         ("dataset", "scan-graph[collection=kitti]", "must be 'scannet' or 'redwood'"),

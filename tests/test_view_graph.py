@@ -102,3 +102,16 @@ def test_ellis_islands_view_graph_is_that_of_its_scene(real_data: Path) -> None:
     simulated = load(ViewGraph("Ellis_Island"), real_data)
     measured = load(OneDSfM("Ellis_Island", protocol="component"), real_data)
     np.testing.assert_array_equal(np.unique(simulated.problem.edges, axis=0), np.unique(measured.problem.edges, axis=0))
+
+
+def test_correlated_errors_follow_the_seed_and_what_is_given(tmp_path: Path) -> None:
+    edges = np.stack(np.triu_indices(60, 1), axis=1)
+    write_view_graph(tmp_path / "Full.npz", n=60, edges=edges)
+    given = ViewGraph(noise="correlated", noise_deg=3.0, outliers=0.1)
+    assert the_source(given, tmp_path).name == "Full-correlated-noise-noise3.0-outliers0.1"
+    drawn, other = (load(ViewGraph(noise="correlated"), tmp_path, seed) for seed in (0, 1))
+    assert drawn.name == "Full-correlated-noise"
+    assert (drawn.problem.rotations != other.problem.rotations).any()
+    instance = load(given, tmp_path)
+    assert instance.truth is not None
+    assert np.median(np.degrees(instance.problem.residuals(instance.truth))) == pytest.approx(3.0, rel=0.35)

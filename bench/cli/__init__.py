@@ -12,6 +12,7 @@ import typer
 from bench import __version__
 from bench.cli import (
     bibtex,
+    calibrate,
     check,
     compare,
     data,
@@ -59,6 +60,7 @@ def bench(
 VERBS = (
     *(run.run, rerun.rerun, list_.list_, table.table, plot.plot, compare.compare, report.report, paper.paper),
     *(merge.merge, doctor.doctor, bibtex.bibtex, map.map_, solve.solve, score.score, new.new, check.check),
+    calibrate.calibrate,
 )
 for verb in VERBS:
     app.command(verb.__name__.rstrip("_"))(verb)

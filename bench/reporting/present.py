@@ -13,6 +13,7 @@ from bench.scoring.results import Results
 
 if TYPE_CHECKING:
     from bench.reporting.figures.data import Drawing
+    from bench.scoring.calibration.agreement import Calibration
 
 EXTENSIONS = {"console": "txt", "markdown": "md", "csv": "csv", "latex": "tex"}
 
@@ -78,3 +79,19 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
         written.append(folder / "captions.tex")
         written[-1].write_text(captions(figures), encoding="utf-8")
     return written
+
+
+def write_calibration(found: "Calibration", folder: Path) -> list[Path]:
+    """Write a calibration as CSV and Markdown, and its figure as PNG, PDF and SVG."""
+    from bench.reporting.figures.calibrated import methods_on_both
+    from bench.reporting.figures.paint_matplotlib import paint
+    from bench.reporting.figures.style import save
+    from bench.reporting.tables.calibrated import calibration_grid
+
+    folder.mkdir(parents=True, exist_ok=True)
+    grid = calibration_grid(found)
+    written = []
+    for style in ("csv", "markdown"):
+        written.append(folder / f"calibration.{EXTENSIONS[style]}")
+        written[-1].write_text(render.text_of(grid, found.rows, style)[0], encoding="utf-8")
+    return written + (save(paint(methods_on_both(found)), folder, "methods") if any(found.medians.values()) else [])

@@ -41,7 +41,8 @@ def _chart(chart: Chart) -> Figure:
         ax.set_title(panel.title, loc="left")
         for k, s in enumerate(panel.series):
             line = _line(s, s.x, s.y)
-            line.set_markevery(_marks(k, len(s.x)))
+            if s.kind != "points":
+                line.set_markevery(_marks(k, len(s.x)))
             ax.add_line(line)
             if s.ring is not None:
                 ax.plot(s.x[s.ring], s.y[s.ring], "o", color=s.look.color, fillstyle="none", markersize=6)

@@ -1,15 +1,14 @@
 """How well the measurements close around triangles, and whether wrong ones agree with each other."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core import so3
 from bench.core.problem import Floats, Problem
+from bench.core.triangles import closures, sample_triangles
 
-SAMPLE = 20_000  # paths
+SAMPLE = 20_000
 WRONG_DEG = 10.0
 
 
@@ -22,7 +21,7 @@ class Cycles:
     edges
         (k, 3) indices of the edges of each.
     residuals
-        (k,) angles of R_ab R_bc R_ca, degrees.
+        (k,) angles by which they do not close, degrees.
     """
 
     edges: NDArray[np.intp]
@@ -30,34 +29,9 @@ class Cycles:
 
 
 def sample_cycles(problem: Problem, size: int = SAMPLE) -> Cycles:
-    """Triangles drawn uniformly and with replacement; the same ones for the same graph.
-
-    So many paths a - c - b are drawn uniformly, the middle c in proportion to the number of its pairs of neighbours;
-    those that an edge (a, b) closes are kept, and the others not replaced. Every triangle is closed from three paths,
-    so none is preferred.
-    """
-    rng = np.random.default_rng(0)
-    pair = problem.edges[:, 0].astype(np.int64) * problem.n + problem.edges[:, 1]
-    _, once = np.unique(pair, return_index=True)  # of parallel edges the first
-    names = np.zeros(problem.m)
-    names[once] = once + 1.0
-    graph = problem.adjacency(names)  # its values name the edges
-    degree = np.diff(graph.indptr).astype(np.int64)
-    pairs = degree * (degree - 1)
-    if not pairs.any():
-        return Cycles(np.empty((0, 3), dtype=np.intp), np.empty(0))
-    middle = rng.choice(problem.n, size, p=pairs / pairs.sum()).astype(np.intp)
-    first = (rng.random(size) * degree[middle]).astype(np.int64)
-    second = (first + 1 + (rng.random(size) * (degree[middle] - 1)).astype(np.int64)) % degree[middle]
-    one, other = graph.indptr[middle] + first, graph.indptr[middle] + second
-    a, b = graph.indices[one].astype(np.intp), graph.indices[other].astype(np.intp)
-    closing = np.asarray(graph[a, b]).ravel().astype(np.intp) - 1
-    closed = closing >= 0
-    edges = np.stack([graph.data[one] - 1, graph.data[other] - 1, closing], axis=1).astype(np.intp)[closed]
-    a, b, c = a[closed], b[closed], middle[closed]
-    sides = ((0, a, c), (1, c, b), (2, b, a))
-    ac, cb, ba = (_directed(problem, edges[:, k], start, end) for k, start, end in sides)
-    return Cycles(edges, np.degrees(so3.angle(ac @ cb @ ba)))
+    """At most `size` triangles drawn uniformly and with replacement; the same ones for the same graph."""
+    edges = sample_triangles(problem, size, np.random.default_rng(0))
+    return Cycles(edges, np.degrees(closures(problem.rotations, edges)))
 
 
 def agreeing_share(cycles: Cycles, at_truth: Floats) -> float:
@@ -80,9 +54,3 @@ def agreeing_share(cycles: Cycles, at_truth: Floats) -> float:
         return float("nan")
     closing = cycles.residuals[wrong] <= np.median(cycles.residuals[right])
     return min(1.0, 2 * float(closing.mean()))
-
-
-def _directed(problem: Problem, edges: NDArray[np.intp], start: NDArray[Any], end: NDArray[Any]) -> Floats:
-    """Measured rotations (k, 3, 3) of edges, transposed where they are stored from `end` to `start`."""
-    stored = problem.rotations[edges]
-    return np.where((start < end)[:, None, None], stored, np.swapaxes(stored, -1, -2))
