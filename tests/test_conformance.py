@@ -52,6 +52,8 @@ CONFIGURATIONS = [
     "dmf-synch[loss=[l1,l2]]",
     "dmf-synch[init=[cemp-mst,random]]",
     "dmf-synch[preset=dense]",
+    "consensus",
+    "consensus[agreeing=[1,8]]",
     "hara",
     "hara[filter_deg=180,irls_iterations=0]",
     "tg-mcmc",

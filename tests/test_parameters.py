@@ -11,7 +11,8 @@ from bench.plugins.catalog import catalog
 OUT_OF_RANGE = {
     "method": [
         "bcd[tolerance=-1]", "bcd[max_epochs=0]", "cemp[triangles=0]", "cemp[iterations=11]", "colmap[sigma_deg=0]",
-        "crdmf[candidates=11]", "crdmf[iterations=0]", "crdmf[momentum=1]", "crdmf[preset=paper,init_scale=0]",
+        "consensus[agreeing=0]", "crdmf[candidates=11]", "crdmf[iterations=0]", "crdmf[momentum=1]",
+        "crdmf[preset=paper,init_scale=0]",
         "desc[rate=0]", "desc[triangles=0]", "desc[tolerance_deg=0]", "dmf-synch[depth=1]", "dmf-synch[width=2]",
         "dmf-synch[lr=0]", "dmf-synch[momentum=1]", "dmf-synch[smoothing_deg=0]", "dmf-synch[checkpoint_every=0]",
         "gnc[threshold_deg=0]", "gnc[tolerance_deg=-1]", "gnc[iterations=-1]", "gnc[inner_iterations=0]",

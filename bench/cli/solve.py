@@ -49,8 +49,8 @@ def solve(
         typer.echo(f"{name}: {'used' if name in report.used else f'not used by {chosen}'}")
     residuals = problem.residuals(estimate.rotations)
     said = {"edges": loaded.cameras[problem.edges], "residuals": residuals, "stop_reason": estimate.stop_reason}
-    if estimate.edge_weights is not None:
-        said["edge_weights"] = estimate.edge_weights
+    optional = {"edge_weights": estimate.edge_weights, "camera_sigma": estimate.camera_sigma}
+    said |= {what: values for what, values in optional.items() if values is not None}
     write(loaded.cameras, estimate.rotations, said)
     ended_by = f", ended by: {estimate.stop_reason}" if estimate.stop_reason else ""
     typer.echo(f"{chosen}: {report.solve_s or 0.0:.2f} s{ended_by}{_fit(problem, estimate)}")

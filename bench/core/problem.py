@@ -279,6 +279,9 @@ class Estimate:
         (n, 3, 3) absolute rotations; NaN where a camera was not solved.
     edge_weights
         (m,) how much each edge was believed at the end, or None.
+    camera_sigma
+        (n,) angle in radians below which the method expects the error of a camera with probability 68 %, and below
+        twice which with 95 %; or None.
     iterations
         How many were done, or None.
     stop_reason
@@ -298,6 +301,7 @@ class Estimate:
 
     rotations: Floats
     edge_weights: Floats | None = None
+    camera_sigma: Floats | None = None
     iterations: int | None = None
     stop_reason: str = ""
     cost: float | None = None

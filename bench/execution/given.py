@@ -90,6 +90,10 @@ class Given:
         if weights is not None:
             weights = _spread(np.asarray(weights)[self.place], self.m, self.edges)
 
+        sigma = estimate.camera_sigma
+        if sigma is not None:
+            sigma = _spread(np.asarray(sigma), self.n, self.cameras)
+
         def of_all(rotations: Floats) -> Floats:
             return _spread(rotations, self.n, self.cameras)
 
@@ -97,6 +101,7 @@ class Given:
             estimate,
             rotations=of_all(estimate.rotations),
             edge_weights=weights,
+            camera_sigma=sigma,
             checkpoints=tuple(replace(c, rotations=of_all(c.rotations)) for c in estimate.checkpoints),
             notes=(*estimate.notes, *self.notes),
         )

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from bench.core.errors import described
-from bench.core.problem import ROTATION_TOLERANCE, Checkpoint, Estimate, Problem
+from bench.core.problem import ROTATION_TOLERANCE, Checkpoint, Estimate, Floats, Problem
 from bench.storage.record import Moment, Report
 
 MOST_TEXT = 100_000  # characters of all notes, and of the stop reason
@@ -71,6 +71,8 @@ def _complaints(problem: Problem, estimate: Estimate, elapsed: float) -> Iterabl
         yield "no camera was solved"
     if estimate.edge_weights is not None:
         yield _wrong_weights(estimate.edge_weights, problem.m)
+    if estimate.camera_sigma is not None:
+        yield _wrong_sigma(estimate.camera_sigma, estimate.rotations)
     seconds = estimate.conversion_s
     if not _is_number(seconds):
         yield f"conversion_s must be a number of seconds, not {_brief(seconds)}"
@@ -113,6 +115,17 @@ def _wrong_weights(weights: Any, m: int) -> str:
         return f"edge_weights must be numbers, not {weights.dtype}"
     bad = ~(np.isfinite(weights) & (weights >= 0))
     return f"{bad.sum()} of {m} edge_weights are negative or not finite" if bad.any() else ""
+
+
+def _wrong_sigma(sigma: Any, rotations: Floats) -> str:
+    n = len(rotations)
+    if (wrong := _wrong_array("camera_sigma", sigma)) or sigma.shape != (n,):
+        return wrong or f"camera_sigma must have shape ({n},), not {sigma.shape}"
+    if sigma.dtype.kind not in "fiu":
+        return f"camera_sigma must be numbers, not {sigma.dtype}"
+    told = sigma[~np.isnan(rotations).all(axis=(1, 2))]
+    bad = ~(np.isfinite(told) & (told >= 0))
+    return f"{bad.sum()} of {n} camera_sigma are negative or not finite" if bad.any() else ""
 
 
 def _wrong_array(what: str, array: Any) -> str:

@@ -39,8 +39,9 @@ def load_problem(path: Path) -> Problem:
 def save_estimate(path: Path, estimate: Estimate) -> None:
     """Write the arrays of an estimate, float64 and unrounded, as ``.npz``."""
     arrays: dict[str, Any] = {"rotations": np.asarray(estimate.rotations, dtype=np.float64)}
-    if estimate.edge_weights is not None:
-        arrays["edge_weights"] = np.asarray(estimate.edge_weights, dtype=np.float64)
+    for name in ("edge_weights", "camera_sigma"):
+        if (values := getattr(estimate, name)) is not None:
+            arrays[name] = np.asarray(values, dtype=np.float64)
     if estimate.checkpoints:
         arrays["checkpoints"] = np.stack([c.rotations for c in estimate.checkpoints])
     with path.open("wb") as file:
@@ -55,13 +56,14 @@ def load_estimate(path: Path, report: Report) -> Estimate:
     InputError
         Where the file holds something else, or another number of checkpoints than the report.
     """
-    arrays = archive.load(path, ("rotations", "edge_weights", "checkpoints"))
+    arrays = archive.load(path, ("rotations", "edge_weights", "camera_sigma", "checkpoints"))
     try:
         n = len(_floats(arrays["rotations"], (-1, 3, 3)))
         states = _floats(arrays["checkpoints"], (-1, n, 3, 3)) if "checkpoints" in arrays else ()
         return Estimate(
             rotations=arrays["rotations"],
             edge_weights=_floats(arrays["edge_weights"], (-1,)) if "edge_weights" in arrays else None,
+            camera_sigma=_floats(arrays["camera_sigma"], (n,)) if "camera_sigma" in arrays else None,
             iterations=report.iterations,
             stop_reason=report.stop_reason,
             cost=report.cost,

@@ -162,20 +162,20 @@ def smallest_of_dense(matrix: Floats, count: int) -> Eigenspace:
     return Eigenspace(values[:count], vectors[:, :count], error, 0)
 
 
-def narrow(graph: "sparse.csr_array") -> bool:
+def narrow(graph: "sparse.csr_array", share: float = NARROW) -> bool:
     """Whether the cameras of a symmetric matrix (n, n) can be numbered so that factors are cheap.
 
-    By the largest distance from the diagonal in the reverse Cuthill-McKee numbering.
+    By the largest distance from the diagonal in the reverse Cuthill-McKee numbering, below `share` of n.
     """
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
     n = graph.shape[0]
     degrees = np.diff(graph.indptr)
-    if degrees.max() >= 2 * NARROW * n:  # the bandwidth is at least half of it
+    if degrees.max() >= 2 * share * n:  # the bandwidth is at least half of it
         return False
     position = np.empty(n, dtype=np.intp)
     position[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(n)
-    return bool(np.abs(position[np.repeat(np.arange(n), degrees)] - position[graph.indices]).max() < NARROW * n)
+    return bool(np.abs(position[np.repeat(np.arange(n), degrees)] - position[graph.indices]).max() < share * n)
 
 
 def sparse_factors(matrix: "sparse.csr_array") -> "Product | None":

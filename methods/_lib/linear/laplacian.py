@@ -9,6 +9,7 @@ from bench import Floats, Ints, Problem
 from ..graph.confidence import confidence, strengths
 from ..loops import edge_kernels
 from ..loops.edge_kernels import Singles
+from .eigen import narrow
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -18,6 +19,7 @@ SMALL = 200  # cameras; up to here dense factors are fastest whatever the densit
 DENSE_SHARE = 0.1  # of all pairs that are edges; from here on dense factors are fastest
 LARGE = 500  # cameras; from here on conjugate gradients are fastest where the graph is well connected
 WELL_CONNECTED = 20  # edges at a camera, on average
+SEQUENCE = 0.02  # bandwidth over cameras, below which factors are cheap and conjugate gradients slow
 SMALLEST = np.finfo(np.float32).tiny  # in place of zero, under a fraction
 MOST_PRODUCTS = 500  # of conjugate gradients in one system, before it is factored instead
 
@@ -51,8 +53,8 @@ class LaplacianSolver:
     ``posv``) or sparse (SuperLU without pivoting, the matrix being positive definite; the ordering that
     reduces fill is found once), whichever was measured to be faster at this size and density.
 
-    Where an approximation will do, large graphs with many edges at a camera are not factored: conjugate
-    gradients, preconditioned by the diagonal, single precision. A system that takes them too long is
+    Where an approximation will do, large graphs with many edges at a camera are not factored, except long sequences:
+    conjugate gradients, preconditioned by the diagonal, single precision. A system that takes them too long is
     factored after all, and so is every later one.
 
     Parameters
@@ -69,7 +71,8 @@ class LaplacianSolver:
         self._degrees = np.empty(problem.n)
         self._sums = np.empty((problem.n, 3))
         well_connected = problem.n >= LARGE and 2 * problem.m >= WELL_CONNECTED * problem.n
-        self._tolerance = tolerance if well_connected else 0.0
+        iterative = tolerance > 0 and well_connected and not narrow(problem.adjacency(), SEQUENCE)
+        self._tolerance = tolerance if iterative else 0.0
         self._factored = _factored(problem) if self._tolerance == 0 else None
 
     def solve(self, weights: Floats, vectors: Floats) -> Floats:
