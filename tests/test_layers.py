@@ -24,7 +24,7 @@ ORDER = (
     ("running",),
     ("scoring",),
     ("reporting",),
-    ("papers", "maps"),
+    ("papers", "maps", "site"),
     ("api",),
     ("cli",),
     ("__main__",),

@@ -16,6 +16,7 @@ from bench.cli import (
     compare,
     data,
     doctor,
+    export,
     list_,
     map,
     merge,
@@ -26,6 +27,7 @@ from bench.cli import (
     rerun,
     run,
     score,
+    site,
     solve,
     table,
 )
@@ -58,7 +60,18 @@ def bench(
 
 VERBS = (
     *(run.run, rerun.rerun, list_.list_, table.table, plot.plot, compare.compare, report.report, paper.paper),
-    *(merge.merge, doctor.doctor, bibtex.bibtex, map.map_, solve.solve, score.score, new.new, check.check),
+    *(
+        export.export,
+        site.site,
+        merge.merge,
+        doctor.doctor,
+        bibtex.bibtex,
+        map.map_,
+        solve.solve,
+        score.score,
+        new.new,
+        check.check,
+    ),
 )
 for verb in VERBS:
     app.command(verb.__name__.rstrip("_"))(verb)
