@@ -43,8 +43,9 @@ def run(
 
     Returns
     -------
-    One row for each instance, method, parameters and seed, whatever became of it. An instance that cannot be loaded
-    has none, and is told in a warning.
+    pandas.DataFrame
+        One row for each instance, method, parameters and seed, whatever became of it. An instance that cannot be loaded
+        has none, and is told in a warning.
 
     Raises
     ------
@@ -117,7 +118,8 @@ def solve(
 
     Returns
     -------
-    The estimate, its rotations (n, 3, 3) NaN where a camera is not in the largest connected component.
+    Estimate
+        Its rotations (n, 3, 3) are NaN where a camera is not in the largest connected component.
 
     Raises
     ------
@@ -168,8 +170,9 @@ def score(estimate: "Estimate | Floats", truth: "Floats", align: str = "l1") -> 
 
     Returns
     -------
-    ``mean_deg, median_deg, rms_deg, p90_deg, max_deg``, the shares ``within_5_deg`` and so on of the scored cameras,
-    and ``n_scored``.
+    dict
+        ``mean_deg, median_deg, rms_deg, p90_deg, max_deg``, the shares ``within_5_deg`` and so on of the scored
+        cameras, and ``n_scored``.
 
     Raises
     ------
@@ -202,7 +205,8 @@ def report(run: str | Path, align: str = "l1", out: str | Path | None = None) ->
 
     Returns
     -------
-    The file that was written.
+    Path
+        The file that was written.
     """
     from bench.reporting.html.page import FILE_NAME, write_report
     from bench.scoring.results import score, under_every_rule
