@@ -11,6 +11,7 @@ import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -19,6 +20,7 @@ import numpy as np
 from bench.core import typed
 from bench.core.errors import InputError, shown
 from bench.core.outcome import Kind
+from bench.reporting.tables.rows import Scene, scenes
 from bench.scoring.results import CONFIGURED, PLACE, Configured, Place, Results, score
 from bench.storage.record import Record
 from bench.storage.store import VERSION, Store
@@ -92,6 +94,11 @@ class Committed:
     name: str
     results: Results
     provenance: Provenance
+
+    @cached_property
+    def scenes(self) -> tuple[Scene, ...]:
+        """What the table says of each scene."""
+        return tuple(scenes(self.results.frame, self.results.ties))
 
     @property
     def release(self) -> str:

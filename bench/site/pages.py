@@ -14,7 +14,6 @@ from bench.reporting.html.section import Table, Value, anchor
 from bench.reporting.html.words import count, enumeration, spoken, what_was_compared
 from bench.reporting.tables.printed import degrees, seconds
 from bench.reporting.tables.rows import Entry, Scene
-from bench.reporting.tables.rows import scenes as scenes_of
 from bench.reporting.tables.standing import overall
 from bench.site.board import RUNS, board, method_pages, run_link
 from bench.site.committed import Committed
@@ -126,7 +125,7 @@ def _leaders(drawn: Picture) -> str:
 
 def _facts(tables: Sequence[Committed]) -> str:
     methods = count(len(method_pages(tables)), "method")
-    scenes = {(s.dataset, s.instance) for t in tables for s in scenes_of(t.results.frame, t.results.ties)}
+    scenes = {(s.dataset, s.instance) for t in tables for s in t.scenes}
     rows = sum(len(table.results.frame) for table in tables)
     return f"{methods}, {count(len(scenes), 'scene')}, {count(rows, 'scored job')} in {count(len(tables), 'run')}"
 
@@ -156,7 +155,7 @@ def _method(method: str, info: MethodInfo | None, tables: Sequence[Committed]) -
     numbers = [
         Number(table, scene, entry)
         for table in tables
-        for scene in scenes_of(table.results.frame, table.results.ties)
+        for scene in table.scenes
         for entry in scene.entries
         if entry.method == method
     ]

@@ -11,7 +11,7 @@ from bench.plugins.declare import DatasetInfo, Info, MethodInfo
 from bench.plugins.references import references
 from bench.reporting.html.words import spoken
 from bench.reporting.tables.printed import degrees, seconds
-from bench.reporting.tables.rows import Entry, Scene, scenes
+from bench.reporting.tables.rows import Entry, Scene
 from bench.site.board import run_link
 from bench.site.committed import Committed
 
@@ -111,7 +111,7 @@ def _numbers() -> tuple[Number, ...]:
     return tuple(
         (table, scene, entry)
         for table in board.committed()
-        for scene in scenes(table.results.frame, table.results.ties)
+        for scene in table.scenes
         for entry in scene.entries
         if scene.has_truth
     )
