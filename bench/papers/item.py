@@ -45,7 +45,7 @@ class Comparison(ABC):
         from bench.reporting.tables.render import text_of
 
         grid = self.printed() if style == "latex" else self.grid()
-        return text_of(grid, self.frame(), style, width=width, terminal=terminal)
+        return text_of([grid], self.frame(), style, width=width, terminal=terminal)
 
 
 class Item(ABC):

@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from bench.core.words import counted
 from bench.reporting.figures.errors import Run
 from bench.reporting.figures.looks import looks_by_selection
 from bench.reporting.html import overview, reversals, words
@@ -133,7 +134,7 @@ def _facts(scene: Scene) -> str:
     """One line: cameras, who is best, what failed."""
     best = [e for e in scene.entries if e.best]
     failed = sum(failed.seeds for e in scene.entries for failed in e.failures)
-    parts = [words.count(scene.cameras, "camera")]
+    parts = [counted(scene.cameras, "camera")]
     if best:
         parts.append(f"best: {words.enumeration([e.label for e in best])}")
     if failed:

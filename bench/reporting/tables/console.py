@@ -12,7 +12,17 @@ from rich.text import Text
 
 from bench.reporting.tables.grid import Grid
 from bench.reporting.tables.printed import area, degrees, exact_seconds, seconds, speedup
-from bench.reporting.tables.rows import ROC_LEGEND, TIE_LEGEND, Entry, Scene, Ties, is_timed, scenes, times_note
+from bench.reporting.tables.rows import (
+    ROC_LEGEND,
+    SEEDS_LEGEND,
+    TIE_LEGEND,
+    Entry,
+    Scene,
+    Ties,
+    is_timed,
+    scenes,
+    times_note,
+)
 
 NO_TRUTH = " · no ground truth: edge residuals, not errors"
 WIDE = 96  # columns from which the 90th percentile and the share under 5 degrees fit
@@ -151,7 +161,7 @@ def _legend(frame: pd.DataFrame) -> list[str]:
         "cameras: solved / scored / all",
     ]
     if frame["seed"].nunique() > 1:
-        lines.append("means over the seeds that ended well, ± half-width of the 95 % t interval over seeds")
+        lines.append(SEEDS_LEGEND)
     if "roc_auc" in frame and frame["roc_auc"].notna().any():
         lines.append(f"AUC: {ROC_LEGEND}")
     return lines

@@ -12,7 +12,17 @@ import pandas as pd
 
 from bench.reporting import appearance
 from bench.reporting.tables.printed import area, degrees, exact_seconds, speedup
-from bench.reporting.tables.rows import ROC_LEGEND, TIE_LEGEND, Entry, Scene, Ties, scenes, times_note
+from bench.reporting.tables.rows import (
+    ROC_LEGEND,
+    SEEDS_LEGEND,
+    TIE_LEGEND,
+    Entry,
+    Scene,
+    Ties,
+    Value,
+    scenes,
+    times_note,
+)
 from bench.scoring.results import Configured
 
 ABBREVIATIONS = {
@@ -141,7 +151,7 @@ def _cell(scene: Scene, entry: Entry | None) -> Cell:
         return Cell("/".join(ABBREVIATIONS.get(ended, ended) for ended in entry.outcomes))
     if not scene.has_truth:
         return Cell(UNKNOWN)
-    mean, median = (_short(entry.values[name].mean) for name in ("mean_deg", "median_deg"))
+    mean, median = (_with_spread(entry.values[name]) for name in ("mean_deg", "median_deg"))
     most = max(e.scored for e in scene.entries)
     marks = PARTIAL * (entry.scored < most) + f" ({entry.ok}/{entry.seeds})" * (entry.ok < entry.seeds)
     return Cell(f"{mean} / {median}{marks}", entry.best)
@@ -153,6 +163,13 @@ def _time(entry: Entry) -> str:
 
 def _area(entry: Entry) -> str:
     return area(entry.value("roc_auc").mean)
+
+
+def _with_spread(value: Value) -> str:
+    """A mean over seeds and the half-width of its interval, where there are several."""
+    return (
+        f"{_short(value.mean)} ±{_short(value.half_width)}" if math.isfinite(value.half_width) else _short(value.mean)
+    )
 
 
 def _short(value: float) -> str:
@@ -182,7 +199,7 @@ def _notes(group: Sequence[Scene], cells: Sequence[str]) -> list[str]:
     used = set(re.split(r"[ /]", text))
     marks += [f"{short}: {name}" for name, short in ABBREVIATIONS.items() if short in used]
     if any(e.seeds > 1 for scene in group for e in scene.entries):
-        marks.append("figures are means over seeds")
+        marks.append(SEEDS_LEGEND)
     notes += [f"{'; '.join(marks)}."] if marks else []
     remarks = [
         (entry.label, remark, scene.instance)

@@ -18,6 +18,11 @@ def degrees(value: float) -> str:
     return "0" if value == 0 else f"{value:.2f}" if value >= 0.005 else f"{value:.0e}"
 
 
+def p_value(value: float) -> str:
+    """A p value as a table prints it."""
+    return "–" if not math.isfinite(value) else "< 0.001" if value < 0.001 else f"{value:.3f}"
+
+
 def exact_seconds(value: float) -> str:
     """A time of a timing run as a table prints it, three digits however short it is."""
     if not math.isfinite(value):

@@ -154,6 +154,7 @@ _VALUES = (
     "speedup_high",
     "roc_auc",
 )
+SEEDS_LEGEND = "means over the seeds that ended well, ± half-width of the 95 % t interval over seeds"
 ROC_LEGEND = "area under the ROC curve of a method's edge weights against the true outliers; 1 tells all of them apart"
 
 
