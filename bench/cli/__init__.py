@@ -16,6 +16,7 @@ from bench.cli import (
     compare,
     data,
     doctor,
+    info,
     list_,
     map,
     merge,
@@ -57,7 +58,17 @@ def bench(
 
 
 VERBS = (
-    *(run.run, rerun.rerun, list_.list_, table.table, plot.plot, compare.compare, report.report, paper.paper),
+    *(
+        run.run,
+        rerun.rerun,
+        list_.list_,
+        info.info,
+        table.table,
+        plot.plot,
+        compare.compare,
+        report.report,
+        paper.paper,
+    ),
     *(merge.merge, doctor.doctor, bibtex.bibtex, map.map_, solve.solve, score.score, new.new, check.check),
 )
 for verb in VERBS:
