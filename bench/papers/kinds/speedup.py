@@ -50,6 +50,10 @@ class Speedup(MeasuredItem):
         """What has to run; the two methods one after the other, on the same data."""
         return (self.suite(name, [self.dataset], [self.method, self.recipe]),)
 
+    def verify(self, sources: Sources) -> None:
+        """Check that `curves` has the errors of the recipe."""
+        self._oracle(sources.reference)
+
     def compare(self, sources: Sources, computed: Computed) -> "Ratio":
         """Time and errors of the method, of the recipe, and their ratio; nothing where the data are not on disk.
 
@@ -144,7 +148,7 @@ class Ratio(Comparison):
                 f"The recipe's time is that of an iteration, measured here, times its {table.iterations:,} iterations.",
                 f"The recipe's errors are its {ORACLE}'s (the iterate that ground truth likes best), from "
                 f"{table.curves}.",
-                *self.computed.absences(),
+                *self.computed.remarks(),
             ),
         )
 

@@ -39,13 +39,13 @@ def workers_of(planned: "Run") -> int:
     return 1 if planned.options.timing else planned.options.jobs or os.cpu_count() or 1
 
 
-def foreseen(planned: "Run") -> str:
-    """How long the run will take, going by earlier records, in a sentence."""
+def foreseen(planned: "Run", *further: "Run") -> str:
+    """How long a run will take, and others after it in the same folder, going by earlier records, in a sentence."""
     from bench.running.progress.pace import remaining_s, span
     from bench.running.progress.past import Past
 
-    past = Past(planned)
-    tasks = [past.task(cell.job) for cell in planned.todo]
+    past = Past(planned, *further)
+    tasks = [past.task(cell.job) for run in (planned, *further) for cell in run.todo]
     workers = workers_of(planned)
     left = remaining_s(past.pace, tasks, workers=workers)
     if left is None:
