@@ -19,6 +19,7 @@ from bench.cli.options import (
     wear,
 )
 from bench.core.program import program
+from bench.core.words import counted
 from bench.running.progress.live import execute, foreseen
 
 if TYPE_CHECKING:
@@ -125,9 +126,10 @@ def _intention(planned: "Run") -> str:
     instances = len({cell.job.instance_key for cell in planned.cells})
     done = f", {total - todo} of them done already" if todo < total else ""
     if planned.options.timing:
-        done += f", timed in {planned.experiment.suite.rounds} rounds against {planned.baseline}"
+        done += f", timed in {counted(planned.experiment.suite.rounds, 'round')} against {planned.baseline}"
     return (
-        f"suite {planned.experiment.suite.name}: {total} jobs on {instances} instances{done} -> {planned.store.folder}"
+        f"suite {planned.experiment.suite.name}: {counted(total, 'job')} on {counted(instances, 'instance')}{done} "
+        f"-> {planned.store.folder}"
     )
 
 

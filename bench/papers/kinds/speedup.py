@@ -131,11 +131,11 @@ class Ratio(Comparison):
     def grid(self) -> "Grid":
         """A row for each of the two."""
         from bench.reporting.tables.grid import Cell, Grid
-        from bench.reporting.tables.printed import degrees
+        from bench.reporting.tables.printed import degrees, short
 
         def texts(row: Side) -> tuple[str, ...]:
-            times = f"{row.iterations}", f"{1e3 * row.iteration_s:.2f}", f"{row.total_s:.3g}"
-            return *times, degrees(row.mean_deg), degrees(row.median_deg), f"{row.times_less:.3g}"
+            times = f"{row.iterations:,}", f"{1e3 * row.iteration_s:.2f}", short(row.total_s)
+            return *times, degrees(row.mean_deg), degrees(row.median_deg), short(row.times_less)
 
         table = self.table
         heads = ("iterations", "ms an iteration", "s in total", "mean", "median", "times less")

@@ -21,6 +21,7 @@ from bench.reporting.html.leaderboard import leaderboard
 from bench.reporting.html.origin import origin
 from bench.reporting.html.scene import sections as forensics
 from bench.reporting.html.section import Section, Value, anchor
+from bench.reporting.tables.printed import short
 from bench.reporting.tables.rows import Scene, is_timed
 from bench.reporting.tables.rows import scenes as scenes_of
 from bench.reporting.tables.standing import overall
@@ -180,7 +181,7 @@ def _html(data: Mapping[str, Any], **content: Any) -> str:
 def cell(value: Value) -> str:
     """A value as a small table prints it."""
     if isinstance(value, float):
-        return f"{value:.3g}" if value == value else "–"
+        return short(value)
     return "–" if value is None else str(value)
 
 

@@ -6,13 +6,14 @@
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pandas as pd
 
 from bench.reporting import appearance
 from bench.reporting.tables.printed import area, degrees, exact_seconds, speedup
 from bench.reporting.tables.rows import (
+    HARDNESS_LEGEND,
     ROC_LEGEND,
     SEEDS_LEGEND,
     TIE_LEGEND,
@@ -77,6 +78,21 @@ class Grid:
     rows: tuple[tuple[tuple[str, ...], tuple[Cell, ...]], ...]
     notes: tuple[str, ...]
     measure: str = ""
+
+
+def parts_of(grid: Grid, count: int) -> list[Grid]:
+    """The same table in equal parts, the facts in each; the notes go below the last."""
+    size = -(-len(grid.methods) // count)
+    return [
+        replace(
+            grid,
+            caption=f"{grid.caption} (part {part + 1} of {count})" if count > 1 else grid.caption,
+            methods=grid.methods[part * size : (part + 1) * size],
+            rows=tuple((facts, cells[part * size : (part + 1) * size]) for facts, cells in grid.rows),
+            notes=grid.notes if part == count - 1 else (),
+        )
+        for part in range(count)
+    ]
 
 
 def markdown(tables: Sequence[Grid], footnotes: Sequence[str] = ()) -> str:
@@ -194,6 +210,8 @@ def _notes(group: Sequence[Scene], cells: Sequence[str]) -> list[str]:
     counted = re.search(r"\(\d+/\d+\)", text) is not None
     marks = [f"{mark}: {meaning}" for mark, meaning in legend.items() if mark in text]
     marks += ["(k/s): only k of s seeds ended well"] if counted else []
+    if any(math.isfinite(scene.hardness) for scene in group):
+        marks.append(HARDNESS_LEGEND)
     if any(scene.has_roc for scene in group):
         marks.append(f"{ROC}: {ROC_LEGEND}")
     used = set(re.split(r"[ /]", text))

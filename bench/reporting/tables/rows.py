@@ -155,6 +155,10 @@ _VALUES = (
     "roc_auc",
 )
 SEEDS_LEGEND = "means over the seeds that ended well, ± half-width of the 95 % t interval over seeds"
+HARDNESS_LEGEND = (
+    "hardness: second smallest eigenvalue of the graph's Laplacian over the number of cameras; lower is harder, "
+    "0 is not connected"
+)
 ROC_LEGEND = "area under the ROC curve of a method's edge weights against the true outliers; 1 tells all of them apart"
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from bench.papers.kinds.scenes.table import NO_TRUTH, NOT_IN_PAPER, NOT_ON_DISK, PUBLISHED_ONLY, Measured, Scenes
 from bench.papers.published import FACTS
 from bench.reporting.tables.grid import ABBREVIATIONS, ABSENT, UNKNOWN, Cell, Grid, abbreviated, gathered
+from bench.reporting.tables.rows import HARDNESS_LEGEND
 
 HEADS = {"n_cameras": "Cameras", "edges_percent": "Edges %", "hardness": "Hardness"}
 _DIGITS = {"n_cameras": 0, "edges_percent": 1, "hardness": 4}
@@ -72,8 +73,7 @@ def scene_notes(found: Scenes, marks: Mapping[str, tuple[str, str]], highlighted
     legend += [f"{UNKNOWN}: solved, but no camera has ground truth"] if NO_TRUTH in statuses else []
     used = set(map(abbreviated, statuses))
     legend += [f"{short}: {name}" for name, short in ABBREVIATIONS.items() if short in used]
-    if legend:
-        yield f"{'; '.join(legend)}."
+    yield f"{'; '.join([*legend, HARDNESS_LEGEND])}."
     scores = found.computed.scores
     yield from gathered((score.method, score.status, score.instance) for score in scores if not score.ok)
     yield from gathered((score.method, score.notes, score.instance) for score in scores if score.notes)

@@ -30,11 +30,12 @@
   const digits = (value, three) => (value >= 100 ? value.toFixed(0) : value.toFixed(value >= 10 ? three - 2 : value >= 1 ? three - 1 : three));
   const written = {
     text: (v) => v,
-    deg: (v) => (v === 0 ? "0" : v < 0.005 ? v.toExponential(0) : v.toFixed(2)),
+    deg: (v) => (v === 0 ? "0" : v < 0.0005 ? v.toExponential(0) : v.toFixed(v < 0.005 ? 4 : 2)),
     seconds: (v) => digits(v, 3),
     percent: (v) => `${Math.round(100 * v)} %`,
     area: (v) => (v === 1 ? "1" : Math.min(v, 0.9999).toFixed(4)),
-    number: (v) => (Number.isInteger(v) ? String(v) : v.toFixed(v < 100 ? 1 : 0)),
+    number: (v) => v.toFixed(v < 100 ? 1 : 0),
+    count: (v) => v.toFixed(0),
   };
   const form = document.getElementById("filters");
   const table = document.getElementById("board");
@@ -142,9 +143,9 @@
       dragmode: small ? false : "zoom",
     } };
     const decade = width / (layout.xaxis?.range?.[1] - layout.xaxis?.range?.[0]);
-    if (decade < 200) delete layout.xaxis.dtick; // three labels in each would touch
+    if (decade < 200 && layout.xaxis?.type === "log") delete layout.xaxis.dtick; // three labels in each would touch
     if (width < 800) for (const trace of traces) if (trace.mode === "markers+text") trace.mode = "markers";
-    if (small && layout.xaxis?.side === "top") {
+    if (small && layout.xaxis?.side === "top" && layout.xaxis.type === "category") {
       layout.xaxis.tickangle = -60;
       template.layout.margin.r = 70;
     }
