@@ -28,6 +28,8 @@ def run(
 ) -> "pd.DataFrame":
     """Run a suite and return its scored rows; the same as ``python -m bench run``, without tables and plots on disk.
 
+    In a notebook, progress shows below the cell.
+
     Parameters
     ----------
     suite
@@ -51,6 +53,7 @@ def run(
     InputError
         On anything that the caller has to change.
     """
+    from bench.running.progress.notebook import in_notebook, watched
     from bench.running.run import Options, Run
     from bench.scoring.results import score
 
@@ -66,7 +69,7 @@ def run(
     planned.prepare()
     for sentence in planned.unloaded:
         warnings.warn(sentence, stacklevel=2)
-    for _ in planned.execute():
+    for _ in watched(planned) if in_notebook() and planned.todo else planned.execute():
         pass
     return score(planned.store, align, planned.options.protocol).frame
 

@@ -13,6 +13,7 @@ from bench.cli.options import (
     PluginOption,
     ProtocolOption,
     Rerun,
+    StyleOption,
     UseOption,
     console,
     used,
@@ -79,6 +80,7 @@ def run(
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run, and run nothing.")] = False,
     plugin: PluginOption = None,
+    style: StyleOption = None,
 ) -> None:
     """Run a suite: every method on every instance, each job in a child process with limits.
 
@@ -93,6 +95,7 @@ def run(
     """
     from bench.running.run import Options, Run
 
+    wear(style)
     options = Options(
         out=out,
         data_dir=data_dir,
@@ -150,7 +153,6 @@ def _present(planned: "Run", align: Align) -> None:
     from bench.reporting.present import render_table, write_plots, write_tables
     from bench.scoring.results import score, under_every_rule
 
-    wear()
     results = score(planned.store, align.value, planned.options.protocol, checkpoints=True)
     typer.echo(f"\n{render_table(results, 'console', **console())[0]}")
     folder = planned.store.folder

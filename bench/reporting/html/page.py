@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.core.words import counted
+from bench.reporting import appearance
 from bench.reporting.figures.errors import Run
 from bench.reporting.figures.looks import looks_by_selection
 from bench.reporting.html import overview, reversals, words
@@ -64,6 +65,8 @@ def write_report(store: Store, by_rule: Mapping[str, Results], path: Path) -> Pa
 
 def render(store: Store, by_rule: Mapping[str, Results]) -> str:
     """Text of the page."""
+    wanted = appearance.current()
+    by_rule = {rule: replace(found, frame=wanted.ordered(found.frame)) for rule, found in by_rule.items()}
     results = next(iter(by_rule.values()))
     by_scene = {rule: scenes_of(r.frame, r.ties) for rule, r in by_rule.items()}
     scenes = by_scene[results.alignment]

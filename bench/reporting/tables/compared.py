@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from bench.core.words import counted
-from bench.plugins.selection import label
+from bench.reporting import appearance
 from bench.reporting.tables.grid import ABSENT, Cell, Grid
 from bench.reporting.tables.printed import degrees, exact_seconds, p_value
 from bench.scoring.comparison import Comparison
@@ -67,7 +67,7 @@ def _row(row: "object") -> tuple[tuple[str, ...], tuple[Cell, ...]]:
 
 
 def _label(row: "object") -> str:
-    return label(str(row.method), str(row.params))  # type: ignore[attr-defined]
+    return appearance.current().called(str(row.method), str(row.params))  # type: ignore[attr-defined]
 
 
 def _legend(found: Comparison, threshold: float) -> Iterator[str]:

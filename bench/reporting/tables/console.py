@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from bench.core.words import counted
-from bench.reporting.tables.grid import Grid, parts_of
+from bench.reporting.tables.grid import Grid, named_facts, parts_of
 from bench.reporting.tables.printed import area, degrees, exact_seconds, seconds, speedup
 from bench.reporting.tables.rows import (
     HARDNESS_LEGEND,
@@ -57,8 +57,8 @@ def render_grid(grid: Grid, *, width: int = 100, terminal: bool = False) -> str:
 
 def _grid_table(grid: Grid) -> Table:
     table = _empty_table()
-    for name in grid.facts:
-        table.add_column(name, justify="left" if name in grid.facts[:1] else "right", overflow="fold")
+    for name, named in zip(grid.facts, named_facts(grid), strict=True):
+        table.add_column(name, justify="left" if named else "right", overflow="fold")
     for title, params in grid.methods:
         table.add_column("\n".join(filter(None, (title, *params.split(",")))), justify="right", overflow="fold")
     marks = any(cell.bold for _, cells in grid.rows for cell in cells)

@@ -11,7 +11,6 @@ from bench.reporting.tables.grid import ABSENT, Cell, Grid
 from bench.reporting.tables.printed import degrees, exact_seconds, p_value
 from bench.scoring.contest import OVERALL, SCENE, TIE, Contest
 from bench.scoring.paired import TIME
-from bench.scoring.results import Configured
 
 RATIO = "ratio"
 INTERVAL = "95 % interval"
@@ -29,7 +28,7 @@ def contest_grids(found: Contest, alignment: str, threshold: float) -> list[Grid
     alignment, threshold
         What its errors and verdicts go by.
     """
-    name = named(found.method)
+    name = appearance.current().called(*found.method)
     several = found.scenes > 1
     against = f"{name} against {counted(len(found.others), 'other method')}"
     rules = f"errors in degrees, {alignment} alignment"
@@ -52,12 +51,6 @@ def contest_grids(found: Contest, alignment: str, threshold: float) -> list[Grid
     return [whole, scenes]
 
 
-def named(configured: Configured) -> str:
-    """A configured method as it is selected, or by the name that a style file gives it."""
-    method, params = appearance.current().head(*configured, configured[0])
-    return f"{method}[{params}]" if params else method
-
-
 def _rows(found: Contest, level: str) -> Iterator["pd.Series[Any]"]:
     for _, row in found.rows[found.rows["level"] == level].iterrows():
         yield row
@@ -73,7 +66,7 @@ def _scene(row: "pd.Series[Any]") -> tuple[tuple[str, ...], tuple[Cell, ...]]:
 
 
 def _against(row: "pd.Series[Any]") -> str:
-    return named((str(row["method"]), str(row["params"])))
+    return appearance.current().called(str(row["method"]), str(row["params"]))
 
 
 def _cells(row: "pd.Series[Any]") -> tuple[Cell, ...]:

@@ -40,6 +40,7 @@ UNKNOWN = "n/t"
 PARTIAL = "†"
 ABSENT = "–"
 ROC = "ROC AUC"
+_NUMBER = re.compile(r"[−+-]?[\d.,]*(?: %)?|–")
 TIME, FASTER = "median / min s", "times faster"
 
 
@@ -80,6 +81,12 @@ class Grid:
     measure: str = ""
 
 
+def named_facts(grid: Grid) -> list[bool]:
+    """Which columns of facts hold names, set at the left, and not numbers: the first, and others by most cells."""
+    cells = [[facts[k] for facts, _ in grid.rows] for k in range(len(grid.facts))]
+    return [k == 0 or 2 * sum(_NUMBER.fullmatch(c) is None for c in own) > len(own) for k, own in enumerate(cells)]
+
+
 def parts_of(grid: Grid, count: int) -> list[Grid]:
     """The same table in equal parts, the facts in each; the notes go below the last."""
     size = -(-len(grid.methods) // count)
@@ -100,7 +107,7 @@ def markdown(tables: Sequence[Grid], footnotes: Sequence[str] = ()) -> str:
     parts = []
     for grid in tables:
         header = [*grid.facts, *(f"{title} {params}".strip() for title, params in grid.methods)]
-        align = [":--", *("--:" for _ in grid.facts[1:]), *(":-:" for _ in grid.methods)]
+        align = [*(":--" if named else "--:" for named in named_facts(grid)), *(":-:" for _ in grid.methods)]
         lines = [_pipes(map(markdown_escape, header)), _pipes(align)]
         for facts, cells in grid.rows:
             shown = (f"**{markdown_escape(c.text)}**" if c.bold else markdown_escape(c.text) for c in cells)

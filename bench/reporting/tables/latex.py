@@ -4,7 +4,7 @@ import itertools
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from bench.reporting.tables.grid import Cell, Grid, parts_of
+from bench.reporting.tables.grid import Cell, Grid, named_facts, parts_of
 
 PAGE_PT = 515.0  # what a page of two columns has, 7.16 inches
 CHARACTER_PT, GAP_PT = 4.0, 6.0  # of type as small as ours
@@ -152,7 +152,8 @@ def _long(grid: Grid) -> list[bool]:
 
 def _columns(grid: Grid) -> str:
     lines = rf">{{\raggedright\arraybackslash}}p{{{LINE_PT:g}pt}}"
-    return "".join(lines if long else "r" if k else "l" for k, long in enumerate(_long(grid)))
+    named = named_facts(grid)
+    return "".join(lines if long else "l" if name else "r" for long, name in zip(_long(grid), named, strict=True))
 
 
 def _over(columns: int, text: str) -> str:
