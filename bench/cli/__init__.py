@@ -23,6 +23,7 @@ from bench.cli import (
     new,
     paper,
     plot,
+    regression_pack,
     report,
     rerun,
     run,
@@ -70,9 +71,10 @@ VERBS = (
         paper.paper,
     ),
     *(merge.merge, doctor.doctor, bibtex.bibtex, map.map_, solve.solve, score.score, new.new, check.check),
+    regression_pack.regression_pack,
 )
 for verb in VERBS:
-    app.command(verb.__name__.rstrip("_"))(verb)
+    app.command(verb.__name__.rstrip("_").replace("_", "-"))(verb)
 app.add_typer(data.app, name="data")
 
 
