@@ -17,12 +17,14 @@ from bench.cli import (
     data,
     doctor,
     export,
+    info,
     list_,
     map,
     merge,
     new,
     paper,
     plot,
+    regression_pack,
     report,
     rerun,
     run,
@@ -59,7 +61,17 @@ def bench(
 
 
 VERBS = (
-    *(run.run, rerun.rerun, list_.list_, table.table, plot.plot, compare.compare, report.report, paper.paper),
+    *(
+        run.run,
+        rerun.rerun,
+        list_.list_,
+        info.info,
+        table.table,
+        plot.plot,
+        compare.compare,
+        report.report,
+        paper.paper,
+    ),
     *(
         export.export,
         site.site,
@@ -72,9 +84,10 @@ VERBS = (
         new.new,
         check.check,
     ),
+    regression_pack.regression_pack,
 )
 for verb in VERBS:
-    app.command(verb.__name__.rstrip("_"))(verb)
+    app.command(verb.__name__.rstrip("_").replace("_", "-"))(verb)
 app.add_typer(data.app, name="data")
 
 

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.core.errors import InputError
+from bench.core.words import counted
 from bench.plugins.catalog import catalog
 from bench.plugins.declare import MethodInfo
 from bench.plugins.references import references
 from bench.reporting.html.document import asset, document
 from bench.reporting.html.section import Table, Value, anchor
-from bench.reporting.html.words import count, enumeration, spoken, what_was_compared
+from bench.reporting.html.words import enumeration, spoken, what_was_compared
 from bench.reporting.tables.printed import degrees, seconds
 from bench.reporting.tables.rows import Entry, Scene
 from bench.reporting.tables.standing import overall
@@ -124,10 +125,10 @@ def _leaders(drawn: Picture) -> str:
 
 
 def _facts(tables: Sequence[Committed]) -> str:
-    methods = count(len(method_pages(tables)), "method")
+    methods = counted(len(method_pages(tables)), "method")
     scenes = {(s.dataset, s.instance) for t in tables for s in t.scenes}
     rows = sum(len(table.results.frame) for table in tables)
-    return f"{methods}, {count(len(scenes), 'scene')}, {count(rows, 'scored job')} in {count(len(tables), 'run')}"
+    return f"{methods}, {counted(len(scenes), 'scene')}, {counted(rows, 'scored job')} in {counted(len(tables), 'run')}"
 
 
 def _runs(tables: Sequence[Committed]) -> str:

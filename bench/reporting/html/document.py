@@ -8,6 +8,7 @@ from importlib.resources import files
 from typing import Any
 
 from bench.reporting.html.section import Value
+from bench.reporting.tables.printed import short
 
 PACKAGE = "bench.reporting.html"
 
@@ -53,7 +54,7 @@ def document(
 def cell(value: Value) -> str:
     """A value as a small table prints it."""
     if isinstance(value, float):
-        return f"{value:.3g}" if value == value else "–"
+        return short(value)
     return "–" if value is None else str(value)
 
 

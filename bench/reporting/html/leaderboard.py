@@ -21,7 +21,7 @@ class Column:
 
     key: str
     head: str
-    kind: str  # text, deg, seconds, percent, number, area
+    kind: str  # text, deg, seconds, percent, number, count, area
     meaning: str
 
 
@@ -44,7 +44,7 @@ COLUMNS = (
     Column("auc", "AUC", "area", "Area under the ROC curve of the edge weights against the true outliers"),
     Column("time", "Time s", "seconds", "Time to solve; over all scenes the geometric mean"),
     Column("speedup", "Times faster", "number", "Than the baseline of the timing run"),
-    Column("memory", "MiB", "number", "What solving added to the resident memory, at its peak"),
+    Column("memory", "MiB", "count", "What solving added to the resident memory, at its peak"),
     Column("cameras", "Cameras", "text", "Solved / scored / all"),
     Column("best_on", "Best on", "text", "Scenes on which it is among the best"),
     Column("outcome", "Outcome", "text", "How the jobs ended"),

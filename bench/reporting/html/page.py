@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+from bench.core.words import counted
+from bench.reporting import appearance
 from bench.reporting.figures.errors import Run
 from bench.reporting.figures.looks import looks_by_selection
 from bench.reporting.html import overview, reversals, words
@@ -58,6 +60,8 @@ def write_report(store: Store, by_rule: Mapping[str, Results], path: Path) -> Pa
 
 def render(store: Store, by_rule: Mapping[str, Results]) -> str:
     """Text of the page."""
+    wanted = appearance.current()
+    by_rule = {rule: replace(found, frame=wanted.ordered(found.frame)) for rule, found in by_rule.items()}
     results = next(iter(by_rule.values()))
     by_scene = {rule: scenes_of(r.frame, r.ties) for rule, r in by_rule.items()}
     scenes = by_scene[results.alignment]
@@ -131,7 +135,7 @@ def _facts(scene: Scene) -> str:
     """One line: cameras, who is best, what failed."""
     best = [e for e in scene.entries if e.best]
     failed = sum(failed.seeds for e in scene.entries for failed in e.failures)
-    parts = [words.count(scene.cameras, "camera")]
+    parts = [counted(scene.cameras, "camera")]
     if best:
         parts.append(f"best: {words.enumeration([e.label for e in best])}")
     if failed:

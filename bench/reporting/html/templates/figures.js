@@ -26,9 +26,9 @@
       dragmode: small ? false : "zoom",
     } };
     const decade = width / (layout.xaxis?.range?.[1] - layout.xaxis?.range?.[0]);
-    if (decade < 200) delete layout.xaxis.dtick; // three labels in each would touch
+    if (decade < 200 && layout.xaxis?.type === "log") delete layout.xaxis.dtick; // three labels in each would touch
     if (width < 800) for (const trace of traces) if (trace.mode === "markers+text") trace.mode = "markers";
-    if (small && layout.xaxis?.side === "top") {
+    if (small && layout.xaxis?.side === "top" && layout.xaxis.type === "category") {
       layout.xaxis.tickangle = -60;
       template.layout.margin.r = 70;
     }

@@ -11,11 +11,12 @@
   const digits = (value, three) => (value >= 100 ? value.toFixed(0) : value.toFixed(value >= 10 ? three - 2 : value >= 1 ? three - 1 : three));
   const written = {
     text: (v) => v,
-    deg: (v) => (v === 0 ? "0" : v < 0.005 ? v.toExponential(0) : v.toFixed(2)),
+    deg: (v) => (v === 0 ? "0" : v < 0.0005 ? v.toExponential(0) : v.toFixed(v < 0.005 ? 4 : 2)),
     seconds: (v) => digits(v, 3),
     percent: (v) => `${Math.round(100 * v)} %`,
     area: (v) => (v === 1 ? "1" : Math.min(v, 0.9999).toFixed(4)),
-    number: (v) => (Number.isInteger(v) ? String(v) : v.toFixed(v < 100 ? 1 : 0)),
+    number: (v) => v.toFixed(v < 100 ? 1 : 0),
+    count: (v) => v.toFixed(0),
   };
   const form = document.getElementById("filters");
   const table = document.getElementById("board");
