@@ -254,7 +254,7 @@ class TestHostileNames:
         policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)[1]
         assert "default-src &#39;none&#39;" in policy
         assert "unsafe-inline" not in policy.split("script-src")[1].split(";")[0]
-        assert policy.count("sha256-") == 3
+        assert policy.count("sha256-") == 5
 
 
 class TestPage:
