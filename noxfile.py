@@ -1,4 +1,4 @@
-"""Sessions for development: ``nox`` runs tests, lint and types; ``nox -s demo`` runs the quick suite."""
+"""Sessions for development: ``nox`` runs tests, lint and types; ``docs`` builds the site, ``demo`` runs a suite."""
 
 import nox
 
@@ -25,6 +25,13 @@ def types(session: nox.Session) -> None:
     """Check types, strictly."""
     session.install("-e", ".[test]")
     session.run("mypy", "bench", "methods", "datasets")
+
+
+@nox.session
+def docs(session: nox.Session) -> None:
+    """Build the documentation in build/site, without network and with warnings as errors."""
+    session.install("-e", ".[colmap,docs]")
+    session.run("mkdocs", "build", "--strict", *session.posargs)
 
 
 @nox.session

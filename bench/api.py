@@ -28,6 +28,8 @@ def run(
 ) -> "pd.DataFrame":
     """Run a suite and return its scored rows; the same as ``python -m bench run``, without tables and plots on disk.
 
+    In a notebook, progress shows below the cell.
+
     Parameters
     ----------
     suite
@@ -43,14 +45,16 @@ def run(
 
     Returns
     -------
-    One row for each instance, method, parameters and seed, whatever became of it. An instance that cannot be loaded
-    has none, and is told in a warning.
+    pandas.DataFrame
+        One row for each instance, method, parameters and seed, whatever became of it. An instance that cannot be loaded
+        has none, and is told in a warning.
 
     Raises
     ------
     InputError
         On anything that the caller has to change.
     """
+    from bench.running.progress.notebook import in_notebook, watched
     from bench.running.run import Options, Run
     from bench.scoring.results import score
 
@@ -66,7 +70,7 @@ def run(
     planned.prepare()
     for sentence in planned.unloaded:
         warnings.warn(sentence, stacklevel=2)
-    for _ in planned.execute():
+    for _ in watched(planned) if in_notebook() and planned.todo else planned.execute():
         pass
     return score(planned.store, align, planned.options.protocol).frame
 
@@ -117,7 +121,8 @@ def solve(
 
     Returns
     -------
-    The estimate, its rotations (n, 3, 3) NaN where a camera is not in the largest connected component.
+    Estimate
+        Its rotations (n, 3, 3) are NaN where a camera is not in the largest connected component.
 
     Raises
     ------
@@ -168,8 +173,9 @@ def score(estimate: "Estimate | Floats", truth: "Floats", align: str = "l1") -> 
 
     Returns
     -------
-    ``mean_deg, median_deg, rms_deg, p90_deg, max_deg``, the shares ``within_5_deg`` and so on of the scored cameras,
-    the areas ``auc_5_deg`` and so on under their recall curve, and ``n_scored``.
+    dict
+        ``mean_deg, median_deg, rms_deg, p90_deg, max_deg``, the shares ``within_5_deg`` and so on of the scored
+        cameras, the areas ``auc_5_deg`` and so on under their recall curve, and ``n_scored``.
 
     Raises
     ------
@@ -202,7 +208,8 @@ def report(run: str | Path, align: str = "l1", out: str | Path | None = None) ->
 
     Returns
     -------
-    The file that was written.
+    Path
+        The file that was written.
     """
     from bench.reporting.html.page import FILE_NAME, write_report
     from bench.scoring.results import score, under_every_rule
@@ -211,3 +218,44 @@ def report(run: str | Path, align: str = "l1", out: str | Path | None = None) ->
     store = Store.open(Path(run))
     results = score(store, align, checkpoints=True)
     return write_report(store, under_every_rule(store, results), Path(out) if out else store.folder / FILE_NAME)
+
+
+def compare(
+    run: str | Path,
+    methods: Sequence[str],
+    *,
+    align: str = "l1",
+    protocol: str | None = None,
+    threshold: float = 1.05,
+) -> "pd.DataFrame":
+    """One method of a run against others; the same as ``python -m bench compare --methods``.
+
+    Parameters
+    ----------
+    run
+        The folder of the run.
+    methods
+        Selections of methods in it, the first against each other; of one alone, against all others.
+    align, protocol
+        As in `run`.
+    threshold
+        A ratio between 1 / threshold and threshold is a tie.
+
+    Returns
+    -------
+    The rows of `bench.scoring.contest.Contest`: for each other method, quantity ("median", "mean"; "time" of a timing
+    run) and scene, and over all scenes, the two values, their ratio with its 95 % interval, its p value after Holm's
+    correction, and the verdict: "win", "tie" or "loss".
+
+    Raises
+    ------
+    InputError
+        On a method that the run has not, and where there is nothing to compare.
+    """
+    from bench.scoring.contest import contest
+    from bench.scoring.results import score
+    from bench.storage.store import Store
+
+    if isinstance(methods, str):
+        raise InputError(f"methods takes a list of selections, such as [{methods!r}], not {methods!r} alone")
+    return contest(score(Store.open(Path(run)), align, protocol), methods, threshold).rows

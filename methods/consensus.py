@@ -32,7 +32,7 @@ JUDGED, APART = 0.25, 4.0  # noise scales at which solutions are compared, and b
 @method(
     "consensus",
     title="Consensus",
-    cite="rotsyncbench",
+    cite="rotsync-bench",
     requires=("scipy", "numba"),
     robust=True,
     simple_graph=True,

@@ -79,7 +79,7 @@ class HARA(Warm):
         tree = hierarchical_tree(problem, levels, self.support * len(thresholds))
         notes = [*note_on_missing(triangles.missing(problem.m), "no triplet supports them")]
         if tree.averaged:
-            notes.append(f"{tree.averaged} cameras without triplet support were averaged")
+            notes.append(f"cameras averaged for want of triplet support: {tree.averaged}")
         kept = np.ones(problem.m, dtype=np.bool_)
         if len(triangles.errors) and np.median(triangles.errors) > USUAL_ERROR:
             notes.append("no edge was filtered: most triangles are far from closing")
@@ -89,7 +89,7 @@ class HARA(Warm):
             bridges = _connecting(problem, residuals, kept)
             kept[bridges] = True
             if len(bridges):
-                notes.append(f"{len(bridges)} edges beyond the filter were kept to connect all cameras")
+                notes.append(f"edges kept beyond the filter to connect all cameras: {len(bridges)}")
         return self._refined(problem, tree.rotations, kept, tuple(notes))
 
     def _refined(self, problem: Problem, start: Floats, kept: NDArray[np.bool_], notes: tuple[str, ...]) -> Estimate:

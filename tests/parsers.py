@@ -48,6 +48,8 @@ from bench.papers.layout import load_layout
 from bench.papers.published import read_published
 from bench.plugins import selection
 from bench.plugins.catalog import catalog, scan
+from bench.site.board import board
+from bench.site.committed import Committed, Provenance, read_folder, read_table
 from bench.storage.record import Record, Report
 from bench.storage.store import Store
 from bench.suite.experiment import load_suite
@@ -234,6 +236,17 @@ PUBLISHED = """scene,n_cameras,edges_percent,hardness,Ours,Theirs,source
 Ellis Island,9,50,0.1,0.8,1.3,"a, b"
 Alamo,5,5,,1,,x
 """
+SCORES = """dataset,instance,method,title,params,seed,protocol,alignment,status,mean_deg,median_deg,solve_s,n_cameras,n_solved,n_scored,best
+toy,Q,spectral,Spectral,,0,all,l1,ok,1.5,1.25,0.5,9,9,9,True
+toy,Q,mine,Mine,"depth=2,loss=l1",0,all,l1,error(why),,,,9,,,False
+"""  # noqa: E501
+KEPT = {
+    "schema": 1,
+    "tables": [
+        {"file": "scores.csv", "title": "Mine", "suite": "toy", "commands": ["bench run"], "finished": "2026-01-01"}
+        | {"version": "0.1", "commit": "", "machine": ["x"], "packages": [], "notes": ["a note"]}
+    ],
+}
 FACTS = {"name": "toy", "protocol": "all", "source": "", "revision": "1", "notes": ["a"], "statistics": {"h": 1.0}}
 GRAPH = {"edges": EDGES, "rotations": MEASURED}
 
@@ -254,6 +267,16 @@ def _layouts() -> tuple[bytes, ...]:
     """Every table and figure of the layouts, a file each."""
     texts = [_project_file("bench.papers", f"{name}.toml") for name in toml_file.names("bench.papers")]
     return tuple(part for text in texts for part in re.split(rb"\n(?=\[\w+\]\n)", text) if part.startswith(b"["))
+
+
+def _committed(path: Path) -> Committed:
+    origin = Provenance("scores.csv", "Mine", "toy", (), "2026-01-01", "0.1")
+    return Committed("toy", read_table(path), origin)
+
+
+def _kept(path: Path) -> object:
+    (path.parent / "scores.csv").write_text(SCORES)
+    return read_folder(path.parent)
 
 
 def _suite(path: Path) -> object:
@@ -309,6 +332,8 @@ PARSERS: dict[str, Parser] = {
         _file("paper.toml", lambda path: load_layout(str(path))),
     ),
     "published": Parser((PUBLISHED.encode(),), _file("table.csv", lambda path: read_published(path.parent, path.name))),
+    "scores": Parser((SCORES.encode(),), _file("scores.csv", lambda path: board([_committed(path)]))),
+    "provenance": Parser((_json(KEPT),), _file("provenance.json", _kept)),
     "selection": Parser(
         (
             b"dmf-synch[depth=[2,3],loss=l1]",

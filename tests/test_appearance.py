@@ -140,6 +140,15 @@ def test_the_file_of_the_working_folder_persists(tmp_path: Path, file: Path) -> 
     other = bench("table", run, "--format", "latex", "--style", file, cwd=work)
     assert other.stderr.splitlines()[0] == f"style: {file}"
     assert "Mine" not in other.stdout
+    shown = bench("table", run, cwd=work).stdout
+    assert shown.index(" Mine ") < shown.index(" spanning-tree ")
+    assert "l1-irls" not in shown
+    page = Path(bench("report", run, "--out", tmp_path / "r.html", cwd=work).stdout.strip()).read_text()
+    assert "Mine" in page
+    assert "Mine" not in Path(bench("report", run, "--style", file, cwd=work).stdout.strip()).read_text()
+    refused = bench("run", "-m", "spanning-tree", "--style", "none.toml", "--out", tmp_path / "no", cwd=work, code=2)
+    assert "cannot be read" in refused.stderr
+    assert not (tmp_path / "no").exists()
     drawn = bench("plot", run, "--width", "single", "--out", tmp_path / "plots", cwd=work)
     assert "captions.tex" in drawn.stdout
     assert b"Mine" in (tmp_path / "plots" / "cumulative-errors.svg").read_bytes()
@@ -149,3 +158,10 @@ def test_the_file_of_the_working_folder_persists(tmp_path: Path, file: Path) -> 
 def _bad(folder: Path) -> Path:
     (folder / "bad.toml").write_text("colour = 3")
     return folder / "bad.toml"
+
+
+def test_what_a_method_is_called() -> None:
+    looks = {"a": MethodLook("A"), "b[k=1]": MethodLook("B one"), "c": MethodLook("Same"), "d": MethodLook("Same")}
+    wanted = Appearance(methods=looks)
+    named = [wanted.called(*key) for key in (("a", ""), ("a", "k=2"), ("b", "k=1"), ("b", ""), ("c", ""), ("d", "k=1"))]
+    assert named == ["A", "A[k=2]", "B one", "b", "Same (c)", "Same (d)[k=1]"]

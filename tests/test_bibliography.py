@@ -8,7 +8,7 @@ from commands import bench
 
 from bench.core.errors import InputError
 from bench.plugins.catalog import catalog
-from bench.plugins.references import BENCHMARK, bibliography, cite_keys, read_entries, references
+from bench.plugins.references import BENCHMARK, SUITE, bibliography, cite_keys, read_entries, references
 from bench.running.conformance import check_method
 
 BIBLIOGRAPHY = Path(__file__).parent.parent / "methods" / "references.bib"
@@ -57,6 +57,7 @@ def test_a_missing_key_is_named() -> None:
 def test_the_benchmarks_own_paper_comes_first_and_nothing_twice() -> None:
     methods = catalog("method")
     assert list(bibliography([methods["l1-irls"], methods["dmf-synch"], methods["l1-irls"]])) == [
+        SUITE,
         BENCHMARK,
         "chatterjee2018",
     ]
@@ -70,5 +71,5 @@ def test_the_command(faulty_plugin: Path, tmp_path: Path) -> None:
     bench("run", "--plugin", plugin, "-m", "faulty", "-m", "l1-irls", "-d", "toy", "--out", run)
     done = bench("bibtex", run)
     (tmp_path / "found.bib").write_text(done.stdout)
-    assert list(read_entries(tmp_path / "found.bib")) == ["tejus2023", "me2026", "chatterjee2018"]
+    assert list(read_entries(tmp_path / "found.bib")) == ["rotsync-bench", "tejus2023", "me2026", "chatterjee2018"]
     assert done.stderr == "dataset toy declares no reference\n"

@@ -153,4 +153,4 @@ def test_a_new_dataset_is_checked_and_run(tmp_path: Path) -> None:
     assert len(path.read_text().splitlines()) <= 36
     assert "my-data: fit to be benchmarked" in bench("check", "dataset", "my-data", "--plugin", path).stdout
     run = bench("run", "--plugin", path, "-d", "my-data[n=8]", "-m", "spectral", "--out", tmp_path / "run")
-    assert "1 jobs on 1 instances" in run.stdout
+    assert "1 job on 1 instance" in run.stdout

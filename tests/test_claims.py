@@ -130,3 +130,32 @@ def test_a_form_that_is_not_there_says_where(layout_file: Path) -> None:
     layout_file.write_text(LAYOUT.replace('forms = ["plain"]', 'forms = ["plane"]'))
     with pytest.raises(InputError, match=r"a-paper\.toml: c: unknown form 'plane'; did you mean 'plain'\?"):
         load_layout(str(layout_file))
+
+
+def test_what_takes_hours_is_shown_as_it_was_recorded(tmp_path: Path) -> None:
+    command = ("paper", "dmf-synch-2023", "thin", "--out", tmp_path / "run")
+    done = bench(*command, "--format", "csv")
+    recorded = load_layout("dmf-synch-2023").sources.reference / "dmf-synch-2023/thin.csv"
+    with recorded.open(encoding="utf-8") as file:
+        assert pd.read_csv(io.StringIO(done.stdout)).equals(pd.read_csv(file))
+    assert "recorded results; --compute computes them here" in done.stderr
+    shown = " ".join(bench(*command).stdout.split())
+    assert "(recorded); degrees" in shown
+    assert "Recorded, not computed now: an earlier run, kept as dmf-synch-2023/thin.csv" in shown
+    assert "two core-hours" in shown
+    assert not (tmp_path / "run").exists()
+
+
+def test_what_is_recorded_is_computed_where_it_is_asked_for(layout_file: Path, tmp_path: Path) -> None:
+    layout_file.write_text(layout_file.read_text().replace("seeds = 6", 'recorded = "old.csv"\nseeds = 3'))
+    command = ("paper", layout_file, "c", "--out", tmp_path / "run", "--data-dir", tmp_path)
+    assert "with recorded results" in bench(*command, code=2).stderr
+    assert "Recorded" not in bench(*command, "--compute").stdout
+    assert "Recorded" not in bench(*command).stdout  # all of it is done now
+
+
+def test_recorded_results_that_are_none_are_refused(layout_file: Path, tmp_path: Path) -> None:
+    (tmp_path / "old.csv").write_text("sentence,form\na,b\n")
+    layout_file.write_text(layout_file.read_text().replace("seeds = 6", 'recorded = "old.csv"'))
+    with pytest.raises(InputError, match=r"old.csv holds no recorded results: KeyError\('dataset'\)"):
+        load_layout(str(layout_file)).item("c").read_recorded(load_layout(str(layout_file)).sources)

@@ -60,7 +60,7 @@ def test_a_run_says_where_its_tables_and_plots_are(tmp_path: Path) -> None:
     assert {p.suffix for p in (out / "plots").iterdir()} == {".png", ".pdf", ".svg"}
 
     again = bench("run", *SMALL, "--out", out)
-    assert "2 jobs on 1 instances, 2 of them done already" in again.stdout
+    assert "2 jobs on 1 instance, 2 of them done already" in again.stdout
 
     table = bench("table", out, "--format", "csv")
     found = rows(table.stdout)

@@ -174,7 +174,7 @@ def test_what_is_not_compared_is_said() -> None:
     assert found.notes == (
         "4 jobs are only in the first run: not compared",
         "4 jobs are only in the second run: not compared",
-        "1 jobs are on data that have changed: not compared",
+        "1 job is on data that have changed: not compared",
         "times are not compared: no timing run",
     )
     with pytest.raises(InputError, match="no problem, method and seed in common"):

@@ -171,7 +171,7 @@ def test_what_is_not_installed_is_refused_once(tmp_path: Path) -> None:
 def test_a_fault_that_recurs_is_referred_to(faulty_plugin: Path) -> None:
     info = catalog("method", [faulty_plugin])["faulty"]
     details = [f.detail for f in check_method(info, {"fault": "some-nan"}) if f.result == "failed"]
-    assert details[0] == "1 cameras of a connected graph were not solved"
+    assert details[0] == "1 camera of a connected graph not solved"
     assert details[1] == "as in: exact recovery"
     assert len(details) == len(set(details)) + details.count(details[1]) - 1
 

@@ -37,7 +37,7 @@ def solve(plugin: Path, fault: str, limits: Limits = LIMITS, mark: str = "", see
         ("write", "error(ValueError: assignment destination is read-only)"),
         ("shape", "invalid-output(rotations must be an array of shape (3, 3, 3), not (3, 3))"),
         ("all-nan", "invalid-output(no camera was solved)"),
-        ("one-inf", "invalid-output(1 cameras have entries that are not finite)"),
+        ("one-inf", "invalid-output(1 camera has entries that are not finite)"),
         ("scaled", "invalid-output(3 of 3 matrices are not rotations to 1e-06)"),
         ("reflected", "invalid-output(3 of 3 matrices are not rotations to 1e-06)"),
         ("timeless", "invalid-output(conversion_s is 1e+06 s, which is not within the time that solve took)"),

@@ -200,7 +200,7 @@ def test_the_command_runs_what_is_missing_and_names_a_switch(tmp_path: Path) -> 
     assert {row["switch"] for row in rows} >= {"alignment", "protocol", "statistic", "over", "angle", "method"}
     assert all(row["status"] == "ok" for row in rows)
     again = bench(*arguments, "--out", tmp_path / "run")
-    assert "1 jobs, 1 of them done already" in again.stderr
+    assert "1 job, 1 of them done already" in again.stderr
     assert "single switches" in " ".join(again.stdout.split())
 
 

@@ -116,7 +116,7 @@ def test_folder_is_the_graph_of_cc(tmp_path: Path) -> None:
     assert graph.cameras.tolist() == [1, 3, 4, 8]
     assert graph.problem.m == 6
     assert graph.problem.residuals(rotations[graph.cameras]).max() < 1e-5
-    assert graph.notes == ("22 edges have an end outside cc.txt and are left out",)
+    assert graph.notes == ("22 edges have an end outside cc.txt: left out",)
 
 
 def append(name: str, text: str) -> Callable[[Path], None]:

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from format_seeds import database
 from scenes import bundle_camera, write_scene
 from scipy.spatial.transform import Rotation
 
 from bench.core import so3
 from bench.core.errors import InputError
-from bench.formats import known_formats, read_graph, read_rotations, rotations_writer
+from bench.formats import holds, known_formats, read_graph, read_rotations, rotations_writer
 
 TRUTH = so3.random(np.random.default_rng(8), 5)
 CAMERAS = np.array([3, 4, 7, 9, 12])
@@ -153,3 +154,9 @@ def test_content_decides_whatever_the_name(tmp_path: Path) -> None:
         assert (read_rotations(tmp_path / "truth.dat").rotations == np.eye(3)).all()
         with pytest.raises(InputError, match=f"this is {kind} "):
             read_graph(tmp_path / "truth.dat")
+
+
+def test_a_database_of_colmap_is_no_file_of_rotations(tmp_path: Path) -> None:
+    """Its tables have columns of the names that ``images.txt`` explains."""
+    (tmp_path / "database.db").write_bytes(database())
+    assert holds(tmp_path / "database.db") == {"graph"}

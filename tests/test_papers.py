@@ -209,6 +209,83 @@ def test_a_table_without_any_scene_is_published_only(layout_file: Path, tmp_path
     assert not (tmp_path / "run").exists()
 
 
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    """A file with a method of one's own."""
+    bench("new", "method", "mine", "--into", tmp_path)
+    return tmp_path / "mine.py"
+
+
+def test_a_method_of_ones_own_is_a_column_beside_the_papers(layout_file: Path, tmp_path: Path, mine: Path) -> None:
+    data = tmp_path / "data"
+    write_scene(data / "Ellis_Island", images=12)
+    command = ("paper", layout_file, "t", "--data-dir", data, "--out", tmp_path / "run")
+    own = ("-m", "mine[power=[1,2]]", "--plugin", mine)
+    foreseen = bench(*command, *own, "--dry-run").stdout
+    assert "to run  1dsfm[protocol=truth-subgraph,scene=Ellis_Island] Ellis_Island seed 0 mine[power=1.0]" in foreseen
+    assert "missing: 2 instances of 1dsfm are not on disk" in foreseen
+    assert "time: unknown" in foreseen
+    assert not (tmp_path / "run").exists()
+
+    done = bench(*command, *own, "--format", "csv")
+    assert "4 jobs to run; time: unknown" in done.stderr
+    rows = pd.read_csv(io.StringIO(done.stdout), keep_default_na=False)
+    added = rows[(rows["quantity"] == "not in the paper") & (rows["scene"] == "Ellis Island")]
+    assert added["method"].tolist() == ["mine[power=1.0]", "mine[power=2.0]"]
+    assert (added["measured"].astype(float) < 0.1).all()
+    assert (added["published"] == "").all()
+    markdown = bench(*command, *own, "--format", "markdown").stdout.splitlines()[2]
+    assert markdown.endswith("| Ours | Ours | Theirs | mine power=1.0 | mine power=2.0 |")
+    latex = bench(*command, "--plugin", mine, "--format", "latex").stdout
+    assert " mine " in latex
+    assert "done" in bench(*command, *own, "--dry-run").stdout
+
+
+def test_a_method_of_ones_own_is_a_curve(layout_file: Path, tmp_path: Path, mine: Path) -> None:
+    command = ("paper", layout_file, "f", "-m", "mine", "--plugin", mine, "--seeds", 1, "--out", tmp_path / "run")
+    points = pd.read_csv(io.StringIO(bench(*command, "--format", "csv").stdout))
+    assert points["curve"].value_counts()["mine"] == 4
+    assert points.loc[points["curve"] == "mine", "mean_deg"].notna().all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("t", "-m", "mine"), "there is no method 'mine'"),
+        (("t", "-m", "spectrl"), "did you mean 'spectral'"),
+        (("t", "-m", "spectral[normalised=3]"), "parameter 'normalised' of method 'spectral' must be true or false"),
+        (("t", "-m", "lie-averaging", "--data-dir", "empty"), "there is nothing to run: 3 instances of 1dsfm"),
+        (("t", "--plugin", "none.py"), "--plugin 'none.py': there is no such Python file"),
+        (("t", "--plugin", "broken.py"), "a plug-in is broken"),
+        (("t", "-m", "lie-averaging", "--explain", "Ellis"), "leave out -m and --plugin"),
+        (("u",), "paper a-paper has no 'u' here"),
+    ],
+)
+def test_what_is_wrong_is_said_before_anything_runs(
+    layout_file: Path, tmp_path: Path, arguments: tuple[str, ...], says: str
+) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "broken.py").write_text("1 / 0\n")
+    done = bench("paper", layout_file, *arguments, code=2, cwd=tmp_path)
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_wrong_published_file_is_said_before_anything_runs(layout_file: Path, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(PUBLISHED.replace("Theirs", "Others"))
+    write_scene(tmp_path / "data" / "Ellis_Island", images=12)
+    done = bench("paper", layout_file, "t", "--data-dir", tmp_path / "data", "--out", tmp_path / "run", code=2)
+    assert "no entry for column 'Others'" in done.stderr
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_table_of_properties_takes_no_methods() -> None:
+    says = bench("paper", "dmf-synch-2023", "table2", "-m", "spectral", code=2).stderr
+    assert "-m adds methods to a table of scenes or a figure of curves" in says
+    assert bench("paper", "dmf-synch-2023", "table2", "--dry-run").stdout == "nothing has to run\n"
+
+
 def test_a_figure_with_bands_over_two_seeds(layout_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     done = bench("paper", layout_file, "f", "--seeds", 2, "--out", out, "--format", "csv")

@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import time
+import types
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,12 @@ import pytest
 from commands import bench
 from rich.console import Console
 
+import bench as door
 from bench.core.limits import Limits
 from bench.core.outcome import Kind, Outcome
 from bench.running.progress import board as board_module
 from bench.running.progress.board import Board
+from bench.running.progress.notebook import in_notebook
 from bench.running.progress.pace import Pace, Task, remaining_s, span
 from bench.storage.record import Record, Report
 from bench.suite.plan import Job
@@ -304,3 +307,30 @@ def test_of_earlier_runs_every_method_is_read_and_no_timing_run(faulty_plugin: P
     assert past.pace.seen == 16
     assert {past.task(cell.job).configured for cell in planned.cells} == set(methods)
     assert all(past.pace.knows(past.task(cell.job)) for cell in planned.cells)
+
+
+def test_a_notebook_shows_the_board(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a kernel is asked to show: one output, and its last state."""
+    shown: list[str] = []
+
+    class Output:
+        def update(self, what: object) -> None:
+            shown.append(repr(what))
+
+    def display(what: object, display_id: bool) -> Output:
+        assert display_id
+        shown.append(repr(what))
+        return Output()
+
+    kernel = types.SimpleNamespace(kernel=object())
+    ipython = types.SimpleNamespace(get_ipython=lambda: kernel, display=types.SimpleNamespace(display=display))
+    assert not in_notebook()
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+    monkeypatch.setitem(sys.modules, "IPython.display", ipython.display)
+    assert in_notebook()
+    door.run(methods=["spectral"], datasets=["erdos-renyi[n=8,missing=0.2]"], out=tmp_path / "run", seeds=2)
+    assert "0/2 jobs" in shown[0]
+    assert "2/2 jobs" in shown[-1]
+    before = len(shown)
+    door.run(methods=["spectral"], datasets=["erdos-renyi[n=8,missing=0.2]"], out=tmp_path / "run", seeds=2)
+    assert len(shown) == before  # nothing was to do

@@ -1,7 +1,8 @@
-"""The README's commands do what it says, as they are written."""
+"""The commands of the README and of the pages in docs do what these say, as they are written."""
 
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,12 +12,21 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```(?:\w*)\n(.*?)```", README, re.DOTALL)
-COMMANDS = [
-    line.split("  #")[0].strip() for block in BLOCKS for line in block.splitlines() if line.startswith("python -m")
-]
+PAGES = sorted((ROOT / "docs").rglob("*.md"))
 
 GRAPH = "".join(f"EDGE_SE3:QUAT {i} {i + 1} 0 0 0 0 0 0 1 {' '.join(21 * ['1'])}\n" for i in range(4))
+
+
+def commands(page: str) -> list[str]:
+    """Commands of this program in the blocks of a page, but for those that need a download."""
+    blocks = re.findall(r"```(?:\w*)\n(.*?)```", page, re.DOTALL)
+    lines = [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
+    own = [line for line in lines if line.startswith("python -m bench ")]
+    return [command for command in own if "--suite 1dsfm" not in command and "fetch" not in command]
+
+
+def test_the_readme_fits_on_three_screens() -> None:
+    assert len(README.splitlines()) <= 130
 
 
 def test_the_first_screen_holds_both_commands() -> None:
@@ -30,6 +40,7 @@ def workplace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which the main command has run."""
     folder = tmp_path_factory.mktemp("readme")
     (folder / "graph.g2o").write_text(GRAPH)
+    shutil.copytree(ROOT / "results/reference", folder / "results/reference")
     done = run("python -m bench run", folder)
     assert "plots:" in done
     return folder
@@ -57,9 +68,28 @@ def test_the_lines_of_python_run_as_written(workplace: Path) -> None:
     assert float(done.stdout) < 1e-6
 
 
-SHOWN = [c for c in COMMANDS if c.startswith("python -m bench") and "--suite 1dsfm" not in c and "fetch" not in c]
-
-
-def test_the_other_commands_that_need_no_download_run_in_their_order(workplace: Path) -> None:
-    for command in SHOWN:
+def test_the_commands_of_the_readme_run_in_their_order(workplace: Path) -> None:
+    shown = commands(README)
+    assert len(shown) > 4
+    for command in shown:
         run(command, workplace)
+
+
+def test_the_commands_of_every_page_run_in_their_order(workplace: Path, tmp_path: Path) -> None:
+    ran = 0
+    for page in PAGES:
+        folder = tmp_path / page.stem
+        for command in (shown := commands(page.read_text(encoding="utf-8"))):
+            if not folder.exists():
+                shutil.copytree(workplace, folder)
+            run(command, folder)
+        ran += len(shown)
+    assert ran > 30
+
+
+def test_from_an_empty_file_to_a_table_takes_ten_commands() -> None:
+    text = (ROOT / "docs/tutorials/your-method.md").read_text(encoding="utf-8")
+    first, *_, last = (command.split()[3] for command in commands(text))
+    assert (first, last) == ("new", "site")
+    assert len(commands(text)) <= 10
+    assert "--format latex" in text

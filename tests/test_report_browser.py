@@ -2,7 +2,6 @@
 
 import csv
 import io
-import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -10,20 +9,12 @@ import pytest
 
 from bench.reporting.html.page import write_report
 from bench.scoring.results import score, under_every_rule
+from tests.browsing import Visit, opened
 from tests.commands import bench
 from tests.runs import Made, made_run
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
-ARGUMENTS = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
 HOSTILE = """</script><script>window.hacked = 1</script><img src=x onerror="window.hacked = 2"><a href="http://x.y">z"""
 METHODS = [
     Made("alpha", 1.0, seconds=0.5, checkpoints=4),
@@ -43,38 +34,11 @@ def report(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser():
-    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    with playwright.sync_playwright() as driver:
-        if path is None and not Path(driver.chromium.executable_path).exists():
-            pytest.skip("no Chromium is installed")
-        opened = driver.chromium.launch(executable_path=path, args=list(ARGUMENTS))
-        yield opened
-        opened.close()
+    yield from opened(playwright)
 
 
-class Visit:
-    """A page that lets nothing out, and remembers what it tried and what it complained of."""
-
-    def __init__(self, browser, path, **options):
-        self.requests, self.complaints = [], []
-        self.context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | options))
-        self.context.route("**/*", self._guard)
-        self.page = self.context.new_page()
-        self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.on("console", lambda message: self.complaints.append(message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.goto(path.as_uri())
-
-    def _guard(self, route):
-        if route.request.url.startswith("file:"):
-            route.continue_()
-        else:
-            route.abort()
-
-    @property
-    def left(self):
-        """What was asked of anything but the file itself."""
-        return [url for url in self.requests if not url.startswith(("file:", "data:", "blob:"))]
+class Report(Visit):
+    """A visit of the report."""
 
     def draw_everything(self):
         """Open every part and bring every figure into view."""
@@ -82,12 +46,6 @@ class Visit:
         for figure in self.page.locator("figure[data-figure]").all():
             figure.evaluate("(element) => element.scrollIntoView()")
             figure.locator(".main-svg").first.wait_for()
-
-    def column(self, head):
-        """Texts of a column of the leaderboard."""
-        heads = self.page.locator("#board thead th button").all_inner_texts()
-        cells = self.page.locator(f"#board tbody tr > :nth-child({heads.index(head) + 1})").all_inner_texts()
-        return [text.removesuffix(" *") for text in cells]
 
     def numbers(self, head):
         return [float(text) for text in self.column(head) if text != "–"]
@@ -98,9 +56,9 @@ class Visit:
 
 @pytest.fixture
 def visit(browser, report):
-    opened = Visit(browser, report)
-    yield opened
-    opened.context.close()
+    visit = Report(browser, report)
+    yield visit
+    visit.context.close()
 
 
 def test_every_figure_is_drawn_without_a_complaint_or_a_request(visit):
@@ -212,16 +170,12 @@ def test_curves_that_are_hidden_at_first_can_be_shown(visit):
 
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
 def test_accessibility_and_width(browser, report, width, scheme):
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
-    visit = Visit(browser, report, color_scheme=scheme, viewport={"width": width, "height": 800})
+    visit = Report(browser, report, color_scheme=scheme, viewport={"width": width, "height": 800})
     visit.draw_everything()
     visit.page.evaluate("scrollTo(0, 0)")
     assert visit.page.evaluate("document.documentElement.dataset.theme") == scheme
     assert visit.page.evaluate("document.documentElement.scrollWidth") == width
-    response = axe.Axe().run(visit.page).response
-    assert len(response["passes"]) > 10
-    violations = response["violations"]
-    assert [v["id"] for v in violations if v["impact"] in ("serious", "critical")] == []
+    assert visit.violations() == []
     visit.context.close()
 
 
@@ -239,7 +193,7 @@ def test_a_link_to_a_folded_part_opens_it(visit):
 
 
 def test_prints_in_light_colours_with_its_figures(browser, report):
-    visit = Visit(browser, report, color_scheme="dark")
+    visit = Report(browser, report, color_scheme="dark")
     pdf = visit.page.pdf(format="A4")
     assert pdf.startswith(b"%PDF")
     assert visit.page.locator("#figures .main-svg").count() > 0
@@ -254,7 +208,7 @@ def test_the_report_that_a_run_on_the_real_scenes_ends_with(browser, real_data, 
     methods = ("-m", "l1-irls", "-m", "spanning-tree", "-m", "dmf-synch[loss=l1]")
     done = bench("run", "--suite", "1dsfm", "--data-dir", real_data / "1dsfm", *methods, "--out", out)
     assert f"report: {out / 'report.html'}" in done.stdout
-    visit = Visit(browser, out / "report.html")
+    visit = Report(browser, out / "report.html")
     visit.draw_everything()
     assert "On these 4 scenes" in visit.page.locator(".findings").inner_text()
     assert set(visit.column("Method")) >= {"l1-irls", "spanning-tree"}

@@ -14,8 +14,10 @@ from runs import Made, made_run
 from bench.plugins.catalog import catalog
 from bench.plugins.selection import label
 from bench.reporting.figures import paint_matplotlib, paint_plotly
+from bench.reporting.figures.data import MeanRanks
 from bench.reporting.figures.errors import Run, quantiles
 from bench.reporting.figures.looks import COLORS, look_of, looks, looks_by_selection
+from bench.reporting.figures.style import columns_of
 from bench.reporting.html import overview
 from bench.reporting.html.leaderboard import ALL_SCENES, leaderboard
 from bench.reporting.html.section import Section
@@ -126,9 +128,47 @@ def test_the_leaderboard_has_the_ranks_of_the_critical_difference(
     figure = page["critical-difference"].figure
     assert figure is not None
     marks = figure["data"][-1]
-    written = {f"{name}  {rank:.2f}" for name, rank in zip(marks["y"], marks["x"], strict=True)}
+    written = {f"{name}  {rank:.2f}" for name, rank in zip(marks["text"], marks["x"], strict=True)}
     assert written <= {text.get_text() for text in files["critical-difference"].axes[0].texts}
-    assert overall_ranks(run) == pytest.approx(dict(zip(marks["y"], marks["x"], strict=True)), rel=1e-3)
+    assert written <= {note["text"] for note in figure["layout"]["annotations"]}
+    assert overall_ranks(run) == pytest.approx(dict(zip(marks["text"], marks["x"], strict=True)), rel=1e-3)
+
+
+def test_the_critical_difference_is_the_same_diagram_in_both_painters() -> None:
+    """An axis of mean ranks, bars that join what is not told apart, a line from each rank to its name."""
+    methods = tuple(look_of(name) for name in "abcde")
+    drawing = MeanRanks("t", "c", "r", methods, np.array([1.2, 1.8, 3.0, 4.2, 4.8]), ((0, 1), (2, 4)), 1.5)
+    assert [(bar.low, bar.high) for bar in drawing.bars] == [pytest.approx((1.14, 1.86)), pytest.approx((2.94, 4.86))]
+    assert [leader.left for leader in drawing.leaders] == [True, True, True, False, False]
+    assert drawing.ruler == (1.0, 2.5)
+    (ax,) = paint_matplotlib.paint(drawing).axes
+    lines = {(tuple(map(float, line.get_xdata())), tuple(map(float, line.get_ydata()))) for line in ax.lines}
+    figure = paint_plotly.paint(drawing)
+    bars = [trace for trace in figure["data"] if trace["name"] == "not told apart"]
+    assert {(tuple(bar["x"]), tuple(bar["y"])) for bar in bars} <= lines
+    for leader in drawing.leaders:
+        assert ((leader.rank, leader.rank, leader.end), (0.0, leader.y, leader.y)) in lines
+        place = next(note for note in figure["layout"]["annotations"] if note["text"] == leader.text)
+        assert (place["x"], place["y"]) == (leader.end, leader.y)
+    low, high = figure["layout"]["yaxis"]["range"]
+    assert low + figure["layout"]["xaxis"]["position"] * (high - low) == pytest.approx(0)
+
+
+def test_every_legend_has_the_order_of_the_table(run: Results, page: dict[str, Section]) -> None:
+    order = list(dict.fromkeys(run.frame["method"]))
+    seen = 0
+    for section in page.values():
+        traces = section.figure["data"] if section.figure else []
+        names = [trace["name"] for trace in traces if trace.get("showlegend", True) and trace["name"] in order]
+        if section.figure and section.figure["layout"].get("showlegend", True) and len(names) > 1:
+            assert names == [name for name in order if name in names], section.id
+            seen += 1
+    assert seen >= 6
+
+
+@pytest.mark.parametrize(("count", "columns"), [(1, 1), (2, 2), (3, 3), (4, 2), (5, 3), (6, 3), (7, 3), (9, 3)])
+def test_panels_fill_their_rows(count: int, columns: int) -> None:
+    assert columns_of(count) == columns
 
 
 def overall_ranks(results: Results) -> dict[str, float]:
@@ -202,11 +242,14 @@ class TestCumulative:
         assert quantiles([np.linspace(0, 50, 101)]) == pytest.approx(np.linspace(0, 50, 51))
         assert not len(quantiles([np.full(3, np.nan)]))
 
-    def test_the_legend_of_a_scene_has_the_best_first(self, run: Results, page: dict[str, Section]) -> None:
-        figure = page["cumulative-toy-p-all"].figure
+    def test_the_best_are_shown_at_first(self, tmp_path: Path) -> None:
+        methods = [Made(f"m{k}", scale_deg=10.0 - k) for k in range(overview.SHOWN + 1)]
+        found = score(made_run(tmp_path / "run", ["a"], methods))
+        shown = Run(found.frame, scenes(found.frame, found.ties), found.errors, looks_by_selection(found.frame))
+        sections = {section.id: section for section in overview.of_scene(shown, shown.scenes[0], {})}
+        figure = sections["cumulative-toy-a-all"].figure
         assert figure is not None
-        medians = [trace["x"][25] for trace in figure["data"]]
-        assert medians == sorted(medians)
+        assert [trace["name"] for trace in figure["data"] if trace.get("visible") == "legendonly"] == ["m0"]
 
 
 def test_one_problem_has_no_ranks(tmp_path: Path) -> None:

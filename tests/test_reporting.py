@@ -11,7 +11,10 @@ from bench.reporting.figures.looks import GREY, looks
 from bench.reporting.figures.paint_matplotlib import paint
 from bench.reporting.present import drawings
 from bench.reporting.tables import render as tables
+from bench.reporting.tables.console import render_grid
+from bench.reporting.tables.grid import Cell, Grid
 from bench.reporting.tables.latex import latex_escape
+from bench.reporting.tables.printed import degrees, short
 from bench.scoring.metrics.errors import summary
 from bench.scoring.results import Results
 
@@ -158,6 +161,24 @@ class TestMarkdown:
         assert cells[3][-3:] == ["n/t", "SK", "CR"]
         assert "l1 alignment" in text
         assert "- a note" in text
+
+    def test_hardness_is_explained_where_it_stands(self, run):
+        for how in ("console", "markdown", "latex"):
+            assert "second smallest eigenvalue" in " ".join(render(run, how)[0].split())
+            without = run[0].assign(hardness=np.nan)
+            assert "eigenvalue" not in tables.render(without, run[2], (), how)[0]
+
+    def test_names_are_whole_in_a_file_and_parts_fit_a_terminal(self):
+        names = [f"a-method-with-a-long-name-{k}" for k in range(6)]
+        cells = tuple(Cell("12.34 / 56.78") for _ in names)
+        grid = Grid("A caption", ("Scene", "of"), tuple((n, "") for n in names), ((("Ellis_Island", "x"), cells),), ())
+        (text,) = {tables.text_of([grid], pd.DataFrame(), "console", width=60)[0]}
+        assert all(name in text for name in names)
+        on_terminal = render_grid(grid, width=90, terminal=True)
+        plain = re.sub(r"\x1b\[[0-9;]*m", "", on_terminal)
+        assert all(name in plain for name in names)
+        assert plain.count("Ellis_Island") == 3
+        assert max(map(len, plain.splitlines())) <= 90
 
     def test_legend_explains_the_marks_that_occur_and_no_others(self, run):
         text, _ = render(run, "markdown")
@@ -309,3 +330,8 @@ class TestPlots:
             assert legend.x0 >= max(ax.get_window_extent().x1 for ax in draw.axes)
             assert legend.x1 <= draw.bbox.x1
             assert legend.y0 >= 0
+
+
+def test_numbers_are_readable():
+    assert [degrees(v) for v in (120.0, 9.876, 0.004, 3e-7, 0.0)] == ["120.00", "9.88", "0.0040", "3e-07", "0"]
+    assert [short(v) for v in (36600.4, 999.7, 120.0, 1.234, 0.01234)] == ["36,600", "1,000", "120", "1.23", "0.0123"]

@@ -59,7 +59,7 @@ def test_an_estimate_that_differs_is_told_by_its_angle(faulty_plugin: Path, tmp_
     angle = float(done.stdout.split("up to ")[1].split()[0])
     assert 1 < angle <= 180
     done = bench("rerun", edited(record, job={"parameters": {"fault": "some-nan"}}), code=1)
-    assert "1 cameras are not solved by both" in done.stdout
+    assert "1 camera is not solved by both" in done.stdout
 
 
 @pytest.mark.parametrize(

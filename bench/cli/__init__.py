@@ -17,16 +17,20 @@ from bench.cli import (
     compare,
     data,
     doctor,
+    export,
+    info,
     list_,
     map,
     merge,
     new,
     paper,
     plot,
+    regression_pack,
     report,
     rerun,
     run,
     score,
+    site,
     solve,
     table,
 )
@@ -58,12 +62,33 @@ def bench(
 
 
 VERBS = (
-    *(run.run, rerun.rerun, list_.list_, table.table, plot.plot, compare.compare, report.report, paper.paper),
-    *(merge.merge, doctor.doctor, bibtex.bibtex, map.map_, solve.solve, score.score, new.new, check.check),
-    calibrate.calibrate,
+    *(
+        run.run,
+        rerun.rerun,
+        list_.list_,
+        info.info,
+        table.table,
+        plot.plot,
+        compare.compare,
+        report.report,
+        paper.paper,
+    ),
+    *(
+        export.export,
+        site.site,
+        merge.merge,
+        doctor.doctor,
+        bibtex.bibtex,
+        map.map_,
+        solve.solve,
+        score.score,
+        new.new,
+        check.check,
+    ),
+    *(calibrate.calibrate, regression_pack.regression_pack),
 )
 for verb in VERBS:
-    app.command(verb.__name__.rstrip("_"))(verb)
+    app.command(verb.__name__.rstrip("_").replace("_", "-"))(verb)
 app.add_typer(data.app, name="data")
 
 

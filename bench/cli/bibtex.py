@@ -1,11 +1,11 @@
 """``bench bibtex``: what a paper that uses a run has to cite."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import RunFolder, run_folder
+from bench.cli.options import run_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,15 +14,20 @@ if TYPE_CHECKING:
     from bench.suite.plan import Job
 
 
-def bibtex(run: RunFolder) -> None:
-    """Print the BibTeX entries of every method and dataset of a run, and of the benchmark's own paper.
+def bibtex(
+    run: Annotated[
+        Path | None,
+        typer.Argument(metavar="[RUN]", help="Folder of a run, or its name; without, the benchmark alone."),
+    ] = None,
+) -> None:
+    """Print the BibTeX entries of the benchmark, of the paper it starts from, and of the methods and datasets of a run.
 
     What has none is said on standard error.
     """
     from bench.plugins.references import bibliography, cite_keys
     from bench.storage.store import Store
 
-    plans = Store.open(run_folder(run)).plans()
+    plans = Store.open(run_folder(run)).plans() if run else []
     used = list(_used([job for plan in plans for job in plan.jobs]))
     typer.echo("\n\n".join(bibliography(used).values()))
     for info in used:

@@ -33,7 +33,7 @@ def calibrate(
 
     store = Store.open(run_folder(run))
     found = calibrated(store, score(store, align.value, protocol))
-    show(text_of(calibration_grid(found), found.rows, format.value, **console()))
+    show(text_of([calibration_grid(found)], found.rows, format.value, **console()))
     for line in verdicts(found):
         typer.echo(line, err=format is Format.CSV)
     for path in write_calibration(found, out) if out else ():

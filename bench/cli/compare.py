@@ -1,11 +1,21 @@
-"""``bench compare``: one run against another; the exit code says whether anything is worse."""
+"""``bench compare``: one run against another, or one method of a run against others."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, Format, ProtocolOption, console, run_folder, show
+from bench.cli.options import (
+    Align,
+    AlignOption,
+    Format,
+    ProtocolOption,
+    StyleOption,
+    console,
+    run_folder,
+    show,
+    wear,
+)
 
 if TYPE_CHECKING:
     from bench.scoring.results import Results
@@ -13,33 +23,75 @@ if TYPE_CHECKING:
 
 
 def compare(
-    first: Annotated[Path, typer.Argument(metavar="RUN_A", help="The run that is compared with, folder or name.")],
-    second: Annotated[Path, typer.Argument(metavar="RUN_B", help="The run that is judged.")],
+    given: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="RUN_A RUN_B | --methods METHOD [METHOD...] RUN",
+            help="Two runs, folders or names: the second is judged. Or methods of one run: the first is judged.",
+        ),
+    ],
+    methods: Annotated[
+        bool, typer.Option("--methods", help="Compare methods of one run; of one alone, with all others.")
+    ] = False,
     align: AlignOption = Align.L1,
     protocol: ProtocolOption = None,
     threshold: Annotated[
-        float, typer.Option(metavar="RATIO", help="A change by less than this ratio is no regression.")
+        float, typer.Option(metavar="RATIO", help="A ratio nearer to one than this is no difference.")
     ] = 1.05,
     format: Format = Format.CONSOLE,
+    style: StyleOption = None,
 ) -> None:
-    """Say what became better or worse from RUN_A to RUN_B, on the problems, methods and seeds that both have.
+    """Say what became better or worse from one run to another, or whether one method of a run beats others.
 
-    Exit code 0: nothing is worse; 1: a method's error or time is, or a job no longer ends well; 2: bad input.
+    Of RUN_A and RUN_B, what both have is compared: the same problems, methods and seeds. Exit code 0: nothing is worse;
+    1: a method's error or time is, or a job no longer ends well; 2: bad input.
+
+    With --methods, the first method against each other one: their paired ratio on each scene and over all, with its
+    95 % interval, p after Holm's correction, and on how many scenes it wins, ties and loses. Exit code 0, or 2 on bad
+    input.
     """
     from bench.core.errors import InputError
+
+    if not threshold >= 1:
+        raise InputError(f"--threshold is a ratio of at least 1, such as 1.05, not {threshold:g}")
+    wear(style)
+    if methods:
+        _methods(given, align.value, protocol, threshold, format)
+    elif len(given) == 2:
+        _runs(given[0], given[1], align.value, protocol, threshold, format)
+    else:
+        raise InputError(
+            f"compare takes two runs, not {len(given)}; or, after --methods, methods of one run and then the run"
+        )
+
+
+def _methods(given: list[str], align: str, protocol: str | None, threshold: float, format: Format) -> None:
+    from bench.core.errors import InputError
+    from bench.reporting.tables.contested import contest_grids
+    from bench.reporting.tables.render import text_of
+    from bench.scoring.contest import contest
+    from bench.scoring.results import score
+    from bench.storage.store import Store
+
+    *names, run = given
+    if not names:
+        raise InputError("compare --methods takes one method or more, and then the run: --methods METHOD METHOD RUN")
+    found = contest(score(Store.open(run_folder(Path(run))), align, protocol), names, threshold)
+    show(text_of(contest_grids(found, align, threshold), found.rows, format.value, **console()))
+
+
+def _runs(first: str, second: str, align: str, protocol: str | None, threshold: float, format: Format) -> None:
     from bench.reporting.tables.compared import comparison_grid, comparison_table, verdict
     from bench.reporting.tables.render import text_of
     from bench.scoring.comparison import compare as compared
     from bench.scoring.results import score
     from bench.storage.store import Store
 
-    if not threshold >= 1:
-        raise InputError(f"--threshold is a ratio of at least 1, such as 1.05, not {threshold:g}")
-    stores = [Store.open(run_folder(run)) for run in (first, second)]
-    old, new = (score(store, align.value, protocol) for store in stores)
+    stores = [Store.open(run_folder(Path(run))) for run in (first, second)]
+    old, new = (score(store, align, protocol) for store in stores)
     found = compared(old, new, threshold, no_times=_why_no_times(stores, [old, new]))
-    grid = comparison_grid(found, align.value, threshold)
-    show(text_of(grid, comparison_table(found), format.value, **console()))
+    grid = comparison_grid(found, align, threshold)
+    show(text_of([grid], comparison_table(found), format.value, **console()))
     typer.echo(verdict(found), err=format is Format.CSV)
     raise typer.Exit(1 if found.regressed else 0)
 

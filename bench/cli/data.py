@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from bench.cli.options import DataDirOption, ProtocolOption
+from bench.core.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,7 +51,8 @@ def inspect(name: Name, data_dir: DataDirOption = None, protocol: ProtocolOption
             continue
         instance = source.load()
         problem = instance.problem
-        typer.echo(f"{instance.name}: {problem.n} cameras, {problem.m} edges, protocol {instance.protocol}")
+        size = f"{counted(problem.n, 'camera')}, {counted(problem.m, 'edge')}"
+        typer.echo(f"{instance.name}: {size}, protocol {instance.protocol}")
         sizes = np.bincount(problem.components)
         typer.echo(f"  components {', '.join(map(str, sizes[:8]))}{'…' if len(sizes) > 8 else ''}")
         for key, value in instance.statistics.items():

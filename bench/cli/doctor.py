@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from bench.cli.options import RunFolder, run_folder
+from bench.core.words import counted
 
 
 def doctor(
@@ -36,4 +37,4 @@ def doctor(
     jobs = store.jobs()
     ends = [record.outcome.kind if (record := store.record(job.id)) else outcome.NOT_RUN for job in jobs]
     counts = ", ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
-    typer.echo(f"{folder}: {len(jobs)} jobs planned ({counts})")
+    typer.echo(f"{folder}: {counted(len(jobs), 'job')} planned ({counts})")

@@ -11,14 +11,27 @@ from bench.cli.options import PluginOption
 What = StrEnum("What", ["METHODS", "DATASETS", "SUITES", "PAPERS"])  # that can be listed
 
 
-def list_(what: Annotated[What, typer.Argument()], plugin: PluginOption = None) -> None:
+def list_(
+    what: Annotated[What, typer.Argument()],
+    name: Annotated[
+        str, typer.Argument(metavar="[NAME]", help="Say everything of this method or dataset instead.")
+    ] = "",
+    plugin: PluginOption = None,
+) -> None:
     """List methods, datasets, suites or papers; broken plug-ins are listed with the reason."""
-    if what is What.SUITES:
-        _list_suites()
-    elif what is What.PAPERS:
-        _list_papers()
+    from bench.cli.info import describe
+    from bench.core.errors import InputError
+    from bench.plugins.catalog import catalog
+
+    kind = what.value.removesuffix("s")
+    if what in (What.SUITES, What.PAPERS):
+        if name:
+            raise InputError(f"list {what.value} takes no name: its list says everything; leave out '{name}'")
+        _list_suites() if what is What.SUITES else _list_papers()
+    elif name:
+        describe(catalog(kind, plugin or [])[name])
     else:
-        _list_plugins(what.value.removesuffix("s"), plugin or [])
+        _list_plugins(kind, plugin or [])
 
 
 def _list_suites() -> None:

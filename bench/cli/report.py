@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import Align, AlignOption, ProtocolOption, RunFolder, run_folder
+from bench.cli.options import Align, AlignOption, ProtocolOption, RunFolder, StyleOption, run_folder, wear
 
 
 def report(
@@ -13,6 +13,7 @@ def report(
     align: AlignOption = Align.L1,
     protocol: ProtocolOption = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="The file.  [default: RUN/report.html]")] = None,
+    style: StyleOption = None,
 ) -> None:
     """Write one HTML file with findings in words, a leaderboard, figures, failures and the origin of the numbers.
 
@@ -23,6 +24,7 @@ def report(
     from bench.scoring.results import score, under_every_rule
     from bench.storage.store import Store
 
+    wear(style)
     folder = run_folder(run)
     store = Store.open(folder)
     results = score(store, align.value, protocol, checkpoints=True)

@@ -13,12 +13,14 @@ from bench.cli.options import (
     PluginOption,
     ProtocolOption,
     Rerun,
+    StyleOption,
     UseOption,
     console,
     used,
     wear,
 )
 from bench.core.program import program
+from bench.core.words import counted
 from bench.running.progress.live import execute, foreseen
 
 if TYPE_CHECKING:
@@ -78,6 +80,7 @@ def run(
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run, and run nothing.")] = False,
     plugin: PluginOption = None,
+    style: StyleOption = None,
 ) -> None:
     """Run a suite: every method on every instance, each job in a child process with limits.
 
@@ -92,6 +95,7 @@ def run(
     """
     from bench.running.run import Options, Run
 
+    wear(style)
     options = Options(
         out=out,
         data_dir=data_dir,
@@ -125,9 +129,10 @@ def _intention(planned: "Run") -> str:
     instances = len({cell.job.instance_key for cell in planned.cells})
     done = f", {total - todo} of them done already" if todo < total else ""
     if planned.options.timing:
-        done += f", timed in {planned.experiment.suite.rounds} rounds against {planned.baseline}"
+        done += f", timed in {counted(planned.experiment.suite.rounds, 'round')} against {planned.baseline}"
     return (
-        f"suite {planned.experiment.suite.name}: {total} jobs on {instances} instances{done} -> {planned.store.folder}"
+        f"suite {planned.experiment.suite.name}: {counted(total, 'job')} on {counted(instances, 'instance')}{done} "
+        f"-> {planned.store.folder}"
     )
 
 
@@ -148,7 +153,6 @@ def _present(planned: "Run", align: Align) -> None:
     from bench.reporting.present import render_table, write_plots, write_tables
     from bench.scoring.results import score, under_every_rule
 
-    wear()
     results = score(planned.store, align.value, planned.options.protocol, checkpoints=True)
     typer.echo(f"\n{render_table(results, 'console', **console())[0]}")
     folder = planned.store.folder

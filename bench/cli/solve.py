@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bench.cli.options import PluginOption, UseOption, used
+from bench.core.words import counted
 
 if TYPE_CHECKING:
     from bench.core.problem import Estimate, Problem
@@ -37,7 +38,7 @@ def solve(
     loaded = read_graph(graph)
     write = rotations_writer(out, loaded)
     problem = loaded.problem
-    typer.echo(f"{graph}: {problem.n} cameras, {problem.m} edges")
+    typer.echo(f"{graph}: {counted(problem.n, 'camera')}, {counted(problem.m, 'edge')}")
     with SingleSolver(info, parameters, Limits(timeout, memory, threads), used(use)) as solver:
         ended, report, estimate, _ = solver.solve(problem, seed)
     for note in (*loaded.notes, *report.notes, *doubts(Instance(problem, None, str(graph), ids=loaded.cameras))):

@@ -79,7 +79,8 @@ def loops_told(problem: Problem) -> str | None:
             f"the graph is a {what}: 0 of {problem.m} edges lie in a loop, so that nothing checks the measurements and "
             "the residual tells nothing of the rotations"
         )
-    return f"{bridges} of {problem.m} edges lie in no loop (bridges): nothing checks them"
+    lie = "lies" if bridges == 1 else "lie"
+    return f"{bridges} of {problem.m} edges {lie} in no loop (bridges): nothing checks them"
 
 
 def triangles_told(problem: Problem) -> str | None:

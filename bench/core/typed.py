@@ -95,7 +95,7 @@ def fitted(hint: Any, value: Any, at: str) -> Any:
         return value
     if origin in (types.UnionType, typing.Union):
         return _one_of(arguments, value, at)
-    raise _wrong(_spelled(hint), value, at)
+    raise _wrong(spelled(hint), value, at)
 
 
 def _one_of(options: tuple[Any, ...], value: Any, at: str) -> Any:
@@ -109,7 +109,7 @@ def _one_of(options: tuple[Any, ...], value: Any, at: str) -> Any:
         except InputError as error:
             if not str(error).startswith(f"{at} must be"):
                 complaint = error
-    raise complaint or _wrong(" or ".join(map(_spelled, options)), value, at)
+    raise complaint or _wrong(" or ".join(map(spelled, options)), value, at)
 
 
 def _plain(hint: type, value: Any, at: str) -> Any:
@@ -132,11 +132,13 @@ def _wrong(wanted: str, value: Any, at: str) -> InputError:
     return InputError(f"{at.removesuffix(':')} must be {wanted}, not {shown(value)}")
 
 
-def _spelled(hint: Any) -> str:
+def spelled(hint: Any) -> str:
     """What an annotation takes, in words."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is typing.Literal:
         return " or ".join("none" if value is None else repr(value) for value in arguments)
     if origin is tuple:
         return f"a list of {_SEVERAL.get(arguments[0], 'tables')}"
+    if origin in (types.UnionType, typing.Union):
+        return " or ".join(map(spelled, arguments))
     return _PLAIN.get(hint, "a table")

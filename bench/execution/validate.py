@@ -15,6 +15,7 @@ import numpy as np
 
 from bench.core.errors import described
 from bench.core.problem import ROTATION_TOLERANCE, Checkpoint, Estimate, Floats, Problem
+from bench.core.words import counted
 from bench.storage.record import Moment, Report
 
 MOST_TEXT = 100_000  # characters of all notes, and of the stop reason
@@ -97,7 +98,7 @@ def _wrong_rotations(what: str, rotations: Any, n: int) -> str:
     solved = rotations[~np.isnan(rotations).all(axis=(1, 2))].astype(np.float64)
     finite = np.isfinite(solved).all(axis=(1, 2))
     if not finite.all():
-        return f"{(~finite).sum()} cameras have entries that are not finite"
+        return f"{counted(int((~finite).sum()), 'camera has', 'cameras have')} entries that are not finite"
     small = (abs(solved) <= 2).all(axis=(1, 2))  # so that no square overflows
     solved = np.where(small[:, None, None], solved, 0.0)
     off = np.linalg.norm(solved @ solved.transpose(0, 2, 1) - np.eye(3), axis=(1, 2))

@@ -135,7 +135,8 @@ def _writable_model(path: Path, graph: GraphFile | None) -> None:
 
 
 def _is_text(beginning: Beginning) -> bool:
-    return b"image_id" in beginning.data.lower() or any(
+    names_columns = b"image_id" in beginning.data.lower() and b"\0" not in beginning.data  # as a database does too
+    return names_columns or any(
         len(line) >= 10 and all(map(is_number, line[:9])) and not all(map(is_number, line[9:]))
         for line in beginning.lines
     )

@@ -7,6 +7,7 @@ import numpy as np
 
 from bench.core.errors import InputError, shown
 from bench.core.problem import Floats
+from bench.core.words import counted
 from bench.formats.format import Beginning, Format, RotationsFile
 from bench.formats.graph import GraphFile, Ids, build, checked_rotations, distinct, first
 from bench.formats.lines import Table, check_plain, decode, parse, read_bytes, rows
@@ -52,7 +53,7 @@ def read_folder(folder: Path) -> GraphFile:
     if len(kept) == 0:
         raise InputError(f"{folder / COMPONENT}: no edge joins two of these cameras in {EDGES}; {_SAME_SCENE}")
     outside = len(table.ids) - len(kept)
-    notes = (f"{outside} edges have an end outside {COMPONENT} and are left out",) if outside else ()
+    notes = (f"{counted(outside, 'edge has', 'edges have')} an end outside {COMPONENT}: left out",) if outside else ()
 
     def where(row: int) -> str:
         return table.where(int(kept[row]))

@@ -6,6 +6,7 @@ import numpy as np
 
 from bench.core.errors import InputError
 from bench.core.problem import Floats
+from bench.core.words import counted
 from bench.formats.chain import propagated
 from bench.formats.format import Beginning, Format, RotationsFile, is_number
 from bench.formats.graph import GraphFile, build, checked_rotations, first
@@ -73,7 +74,7 @@ def _chained(graph: GraphFile) -> RotationsFile:
     rotations = propagated(problem)
     notes = [f"chained from {problem.m} relative poses"]
     if outside := graph.problem.n - problem.n:
-        notes.append(f"{outside} cameras are outside the largest component and left out")
+        notes.append(f"{counted(outside, 'camera is', 'cameras are')} outside the largest component and left out")
     worst = float(np.degrees(problem.residuals(rotations)).max())
     if worst > _CONSISTENT_DEG:
         notes.append(f"the relative poses contradict each other by up to {worst:.1f} degrees")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,6 +75,10 @@ class Computed:
         A sentence for what is not on disk.
     instance
         Reads the instance of a job.
+    plugins
+        Files with more methods, which `spelled` knows.
+    recorded
+        Where nothing was computed, a sentence that says what the numbers are; else "".
     """
 
     alignment: str
@@ -83,9 +88,17 @@ class Computed:
     notes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     missing: Sequence[str] = ()
     instance: Callable[[Job], Instance] | None = None
+    plugins: Sequence[str | Path] = ()
+    recorded: str = ""
 
-    def absences(self) -> Iterator[str]:
-        """A sentence for what is not on disk, as a note below a table."""
+    def spelled(self, method: str) -> str:
+        """The selection of a method as its jobs spell it."""
+        return selection.format_selection(*one("method", method, self.plugins))
+
+    def remarks(self) -> Iterator[str]:
+        """What was not computed and what is not on disk, as notes below a table."""
+        if self.recorded:
+            yield self.recorded
         yield from (f"{sentence[0].upper()}{sentence[1:]}." for sentence in self.missing)
 
 
@@ -108,9 +121,9 @@ def scores_of(results: Results, jobs: Sequence[Job]) -> Iterator[Score]:
             )
 
 
-def one(kind: str, text: str) -> tuple[str, dict[str, Any]]:
+def one(kind: str, text: str, plugins: Sequence[str | Path] = ()) -> tuple[str, dict[str, Any]]:
     """Name and given parameters of a selection that stands for one configuration."""
-    info, parameters = catalog(kind).one(text)
+    info, parameters = catalog(kind, plugins).one(text)
     return info.name, parameters
 
 

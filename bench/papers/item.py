@@ -4,8 +4,9 @@ import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from bench.core.errors import InputError
 from bench.papers.computed import Computed
 from bench.papers.published import Sources
 from bench.suite.experiment import Suite
@@ -45,7 +46,7 @@ class Comparison(ABC):
         from bench.reporting.tables.render import text_of
 
         grid = self.printed() if style == "latex" else self.grid()
-        return text_of(grid, self.frame(), style, width=width, terminal=terminal)
+        return text_of([grid], self.frame(), style, width=width, terminal=terminal)
 
 
 class Item(ABC):
@@ -64,6 +65,34 @@ class Item(ABC):
     title: str
     alignment: str
     needs: ClassVar[Collection[str]] = ()
+
+    def verify(self, sources: Sources) -> None:  # noqa: B027
+        """Check what the layout says against the published numbers, before anything runs.
+
+        Raises
+        ------
+        InputError
+            Where the two do not fit together.
+        """
+
+    def with_methods(self, methods: Sequence[str]) -> Self:
+        """The item with further methods, which the paper has not.
+
+        Parameters
+        ----------
+        methods
+            Selections, each of one configuration.
+
+        Raises
+        ------
+        InputError
+            Where it has no place for them.
+        """
+        raise InputError(f"-m adds methods to a table of scenes or a figure of curves, not to “{self.title}”")
+
+    def read_recorded(self, sources: Sources) -> "Comparison | None":
+        """What was computed for it once and kept, where computing it takes hours; None where nothing is kept."""
+        return None
 
     @abstractmethod
     def suites(self, name: str) -> Sequence[Suite]:

@@ -11,7 +11,7 @@ from bench.plugins import selection
 
 T = TypeVar("T")
 
-_RANGE = "range"
+RANGE = "range"
 
 
 def parameter(
@@ -30,7 +30,7 @@ def parameter(
     ...     sweeps: int = parameter(50, at_least=1)
     """
     bounds = {"above": above, "at_least": at_least, "below": below, "at_most": at_most}
-    return dataclasses.field(default=default, metadata={_RANGE: {k: v for k, v in bounds.items() if v is not None}})
+    return dataclasses.field(default=default, metadata={RANGE: {k: v for k, v in bounds.items() if v is not None}})
 
 
 def configured(cls: type[T], parameters: Mapping[str, Any], what: str) -> T:
@@ -42,7 +42,7 @@ def configured(cls: type[T], parameters: Mapping[str, Any], what: str) -> T:
         On an unknown parameter or a value of the wrong type or range.
     """
     hints = typed.fields_of(cast(Any, cls))
-    ranges = {f.name: f.metadata.get(_RANGE, {}) for f in dataclasses.fields(cast(Any, cls))}
+    ranges = {f.name: f.metadata.get(RANGE, {}) for f in dataclasses.fields(cast(Any, cls))}
     values = {}
     for key, value in parameters.items():
         if key not in hints:

@@ -179,6 +179,9 @@ def method(
 ) -> Callable[[T], T]:
     """Declare a frozen dataclass with a `solve` method as a method.
 
+    Where a fact or what is required depends on the parameters, an attribute of its name overrides what is declared
+    (see `Info.fact` and `Info.requires_of`).
+
     Parameters
     ----------
     name, title, cite
@@ -206,9 +209,6 @@ def method(
     depends_on_labels
         Whether its answer depends on the names of the cameras, in ways that no seed of its own governs: from the second
         seed on they are permuted, so that the spread over seeds shows how much.
-
-    Where a fact or what is required depends on the parameters, an attribute of its name overrides what is declared
-    (see `Info.fact` and `Info.requires_of`).
     """
     facts = {
         "install": install,

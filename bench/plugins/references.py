@@ -7,10 +7,12 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+import bench
 from bench.core.errors import InputError, suggestion
 from bench.plugins.declare import Info
 
 FILE = "references.bib"
+SUITE = "rotsync-bench"
 BENCHMARK = "tejus2023"  # the paper that this benchmark starts from
 _START = re.compile(r"^@(\w+)\s*\{\s*([^\s,{}]+)\s*,", re.MULTILINE)
 
@@ -51,7 +53,7 @@ def references(info: Info) -> dict[str, str]:
     InputError
         Where a key is in neither file.
     """
-    known = _shipped()
+    known = {SUITE: suite_entry()} | _shipped()
     beside = Path(str(sys.modules[info.cls.__module__].__file__)).with_name(FILE)
     if beside.is_file():
         known |= read_entries(beside)
@@ -65,11 +67,23 @@ def references(info: Info) -> dict[str, str]:
 
 
 def bibliography(infos: Iterable[Info]) -> dict[str, str]:
-    """What this benchmark is built on, then what the plug-ins cite, each once; raises as `references`."""
-    found = {BENCHMARK: _shipped()[BENCHMARK]}
+    """The benchmark and what it is built on, then what the plug-ins cite, each once; raises as `references`."""
+    found = {SUITE: suite_entry(), BENCHMARK: _shipped()[BENCHMARK]}
     for info in infos:
         found |= references(info)
     return found
+
+
+def suite_entry() -> str:
+    """The entry of this benchmark, in the version that runs; ``CITATION.cff`` says the same."""
+    return (
+        f"@misc{{{SUITE},\n"
+        "  author = {{The rotsync-bench contributors}},\n"
+        "  title  = {rotsync-bench: a Benchmark of Rotation Synchronization Methods},\n"
+        "  year   = {2026},\n"
+        f"  note   = {{Software, version {bench.__version__}}},\n"
+        "}"
+    )
 
 
 def _shipped() -> dict[str, str]:

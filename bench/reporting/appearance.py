@@ -79,6 +79,16 @@ class Appearance:
             return own.name, ""
         return self.of(method, params).name or title, params
 
+    def called(self, method: str, params: str) -> str:
+        """The selection that runs it, or the name that it is given; where two are given one name, with the method."""
+        own = self.methods.get(label(method, params), MethodLook()).name
+        base = "" if own else self.methods.get(method, MethodLook()).name
+        if not own and not base:
+            return label(method, params)
+        several = [look.name for look in self.methods.values()].count(own or base) > 1
+        name = f"{own or base} ({method})" if several else own or base
+        return name if own else label(name, params)
+
     def ordered(self, frame: "pd.DataFrame") -> "pd.DataFrame":
         """The rows with the methods of `order` first; the scenes stay in their order."""
         if not self.order or frame.empty:

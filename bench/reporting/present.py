@@ -93,5 +93,5 @@ def write_calibration(found: "Calibration", folder: Path) -> list[Path]:
     written = []
     for style in ("csv", "markdown"):
         written.append(folder / f"calibration.{EXTENSIONS[style]}")
-        written[-1].write_text(render.text_of(grid, found.rows, style)[0], encoding="utf-8")
+        written[-1].write_text(render.text_of([grid], found.rows, style)[0], encoding="utf-8")
     return written + (save(paint(methods_on_both(found)), folder, "methods") if any(found.medians.values()) else [])

@@ -16,6 +16,7 @@ from bench.core import so3
 from bench.core.errors import InputError
 from bench.core.limits import Limits
 from bench.core.problem import Floats, Problem, oriented
+from bench.core.words import counted
 from bench.execution.single import Answer, SingleSolver
 from bench.plugins.declare import MethodInfo
 from bench.plugins.references import cite_keys, references
@@ -248,7 +249,9 @@ def _ending(answer: Answer, info: MethodInfo) -> str:
 
 def _compare(found: Floats, wanted: Floats, tolerance_deg: float, what: str) -> None:
     if np.isnan(found).any():
-        raise Failed(f"{np.isnan(found).all(axis=(1, 2)).sum()} cameras of a connected graph were not solved")
+        raise Failed(
+            f"{counted(int(np.isnan(found).all(axis=(1, 2)).sum()), 'camera')} of a connected graph not solved"
+        )
     worst = _worst_deg(found, wanted)
     if worst > tolerance_deg:
         if _worst_deg(np.swapaxes(found, -1, -2), wanted) <= tolerance_deg:

@@ -11,6 +11,7 @@ from bench.core import so3
 from bench.core.errors import InputError
 from bench.core.outcome import Outcome
 from bench.core.problem import Estimate, Floats, Problem
+from bench.core.words import counted
 from bench.execution import child, provenance
 from bench.execution.execute import Ended
 from bench.execution.single import Answer, SingleSolver, answer, request_in
@@ -78,7 +79,7 @@ class Repetition:
             return f"the estimate has {len(now)} cameras, and the stored one {len(then)}"
         both = np.isfinite(then).all(axis=(1, 2)) & np.isfinite(now).all(axis=(1, 2))
         others = len(now) - int(both.sum())
-        gone = f"; {others} cameras are not solved by both" if others else ""
+        gone = f"; {counted(others, 'camera is', 'cameras are')} not solved by both" if others else ""
         angle = _largest_angle_deg(now[both], then[both])
         return f"the estimate differs from the stored one by up to {angle:.3g} degrees, the gauge removed{gone}"
 

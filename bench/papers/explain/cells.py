@@ -11,7 +11,7 @@ from bench.papers.explain.switches import Explained, Setting, explain, switches
 from bench.papers.item import Item
 from bench.papers.kinds.scenes.table import SceneTable
 from bench.papers.layout import Layout
-from bench.papers.make import Runner, run_all
+from bench.papers.make import Planned, Runner, plan
 from bench.papers.published import SCENE, methods_of, read_published
 from bench.plugins import selection
 from bench.plugins.catalog import catalog
@@ -25,17 +25,8 @@ PROTOCOL = "protocol"  # the parameter by which a dataset chooses the cameras
 FORM = "SCENE/COLUMN, such as 'Some scene/Some method'"
 
 
-def explanations(
-    layout: Layout, item: Item, names: Sequence[str], options: Options, alignment: str | None, run: Runner
-) -> Iterator[Explained]:
-    """Run what is not done, then explain each of the cells that the names stand for; see `cells`.
-
-    Parameters
-    ----------
-    alignment
-        In place of the item's own.
-    run
-        Prepares and executes a planned run.
+def plans(layout: Layout, item: Item, names: Sequence[str], options: Options) -> dict[tuple[str, str], Planned]:
+    """What has to run for each of the cells that the names stand for, by scene and column; see `cells`.
 
     Raises
     ------
@@ -46,14 +37,38 @@ def explanations(
         raise InputError("--explain takes a table of scenes")
     published = read_published(layout.sources.published, item.published)
     item.check(published)
-    rule = alignment or item.alignment
+    found: dict[tuple[str, str], Planned] = {}
+    taken: set[str] = set()
     for scene, column in dict.fromkeys(cell for name in names for cell in cells(name, item, published)):
-        runs, missing = run_all(_suites(item, scene, column, layout.name), options, run)
-        if not runs:
-            raise InputError(f"--explain '{scene}': {'; '.join(missing)}")
-        jobs = [cell.job for planned in runs for cell in planned.cells]
+        planned = plan(_suites(item, scene, column, layout.name), options, taken)
+        if not planned.runs:
+            raise InputError(f"--explain '{scene}': {'; '.join(planned.missing)}")
+        found[scene, column] = planned
+    return found
+
+
+def explanations(
+    layout: Layout, item: Item, planned: Mapping[tuple[str, str], Planned], alignment: str | None, run: Runner
+) -> Iterator[Explained]:
+    """Run what is not done for each cell, then explain it.
+
+    Parameters
+    ----------
+    layout, item, planned
+        The paper, its table of scenes, and what `plans` found for it.
+    alignment
+        In place of the item's own.
+    run
+        Prepares and executes a planned run.
+    """
+    assert isinstance(item, SceneTable)
+    published = read_published(layout.sources.published, item.published)
+    for (scene, column), of_cell in planned.items():
+        of_cell.execute(run)
+        jobs = [cell.job for part in of_cell.runs for cell in part.cells]
         printed = next(row[column] for row in published if row[SCENE] == scene)
-        yield _explained(item, scene, column, printed, rule, jobs, runs[0].store)
+        store = of_cell.runs[0].store
+        yield _explained(item, scene, column, printed, alignment or item.alignment, jobs, store)
 
 
 def cells(text: str, table: SceneTable, published: Sequence[Mapping[str, str]]) -> list[tuple[str, str]]:

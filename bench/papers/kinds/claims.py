@@ -13,6 +13,7 @@ from bench.core.errors import InputError, shown, suggestion
 from bench.papers.computed import Computed, extended, label
 from bench.papers.item import Comparison, MeasuredItem
 from bench.papers.published import SCENE, Sources, methods_of, read_published
+from bench.papers.recorded import read_rows, recorded_note
 from bench.plugins import selection
 from bench.scoring.inference.difference import LEVEL, holm, paired, unpaired
 from bench.scoring.metrics.oracle import ORACLE
@@ -94,11 +95,15 @@ class Claims(MeasuredItem):
         The sentences.
     published
         File of the published numbers; the paper's name of a scene is ours with spaces.
+    recorded, recorded_took
+        File in ``results/reference`` with the comparisons as they were computed once, and how long that took, in words.
     """
 
     forms: Mapping[str, str]
     statements: tuple[Statement, ...]
     published: str
+    recorded: str = ""
+    recorded_took: str = ""
     seeds: int = 10
     timeout_s: float = 3600.0
 
@@ -119,6 +124,20 @@ class Claims(MeasuredItem):
                 methods.setdefault(place, {})[self._method(case.form, side)] = None
         return tuple(self.suite(name, [dataset], chosen, seeds) for (dataset, seeds), chosen in methods.items())
 
+    def verify(self, sources: Sources) -> None:
+        """Check that every published column is there."""
+        printed = self._all_printed(sources)
+        for case in self._cases():
+            for side in (side for side in (case.left, case.right) if side.published):
+                self._printed(side, printed)
+
+    def read_recorded(self, sources: Sources) -> "Verdicts | None":
+        """The comparisons on file; None where the layout names no file."""
+        if not self.recorded:
+            return None
+        rows = read_rows(Verdict, sources.reference, self.recorded)
+        return Verdicts(self, rows, Computed(self.alignment, recorded=recorded_note(self.recorded, self.recorded_took)))
+
     def compare(self, sources: Sources, computed: Computed) -> "Verdicts":
         """Test every comparison under each rule that picks the iterate.
 
@@ -132,11 +151,7 @@ class Claims(MeasuredItem):
         InputError
             Where a published column is not there.
         """
-        published = read_published(sources.published, self.published)
-        printed = {
-            column: {(row[SCENE].replace(" ", "_"), 0): float(row[column]) for row in published if row[column]}
-            for column in methods_of(published)
-        }
+        printed = self._all_printed(sources)
         rows = []
         for case, rule in itertools.product(self._cases(), RULES):
             left, right = (
@@ -157,6 +172,14 @@ class Claims(MeasuredItem):
     def _name(self, form: str, side: Side) -> str:
         name = f"{side.published} (published)" if side.published else label("method", self._method(form, side))
         return f"{name}, {selection.format_parameters(side.dataset)}" if side.dataset else name
+
+    def _all_printed(self, sources: Sources) -> dict[str, Errors]:
+        """The published errors by column."""
+        published = read_published(sources.published, self.published)
+        return {
+            column: {(row[SCENE].replace(" ", "_"), 0): float(row[column]) for row in published if row[column]}
+            for column in methods_of(published)
+        }
 
     def _printed(self, side: Side, printed: Mapping[str, Errors]) -> Errors:
         if side.published not in printed:
@@ -250,6 +273,7 @@ class Verdicts(Comparison):
             yield Cell(f"{row.difference_deg:+.2f} ±{half:.2f}" if math.isfinite(half) else ABSENT)
             yield Cell(row.verdict, row.verdict == HOLDS)
 
+        when = " (recorded)" if self.computed.recorded else ""
         comparisons: dict[tuple[str, ...], dict[str, Verdict]] = {}
         for row in self.rows:
             key = row.sentence, row.form, row.dataset, row.left, row.right
@@ -262,7 +286,7 @@ class Verdicts(Comparison):
             rows.append((facts, tuple(cell for rule in RULES for cell in cells(by_rule[rule]))))
             said = sentence
         return Grid(
-            caption=f"{self.table.title}; degrees, {self.computed.alignment} alignment",
+            caption=f"{self.table.title}{when}; degrees, {self.computed.alignment} alignment",
             facts=("The paper says", "form", "on", "tested"),
             methods=tuple((what, rule) for rule in RULES for what in ("left", "right", "difference", "verdict")),
             rows=tuple(rows),
@@ -287,7 +311,7 @@ class Verdicts(Comparison):
         for (rule, sentence, form), verdicts in counts.items():
             told = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common())
             yield f"{rule}, {form}: “{sentence}”: {told} (of {verdicts.total()})."
-        yield from self.computed.absences()
+        yield from self.computed.remarks()
 
 
 def _judged(rows: Sequence[Verdict]) -> Iterator[Verdict]:

@@ -50,6 +50,10 @@ class Speedup(MeasuredItem):
         """What has to run; the two methods one after the other, on the same data."""
         return (self.suite(name, [self.dataset], [self.method, self.recipe]),)
 
+    def verify(self, sources: Sources) -> None:
+        """Check that `curves` has the errors of the recipe."""
+        self._oracle(sources.reference)
+
     def compare(self, sources: Sources, computed: Computed) -> "Ratio":
         """Time and errors of the method, of the recipe, and their ratio; nothing where the data are not on disk.
 
@@ -127,11 +131,11 @@ class Ratio(Comparison):
     def grid(self) -> "Grid":
         """A row for each of the two."""
         from bench.reporting.tables.grid import Cell, Grid
-        from bench.reporting.tables.printed import degrees
+        from bench.reporting.tables.printed import degrees, short
 
         def texts(row: Side) -> tuple[str, ...]:
-            times = f"{row.iterations}", f"{1e3 * row.iteration_s:.2f}", f"{row.total_s:.3g}"
-            return *times, degrees(row.mean_deg), degrees(row.median_deg), f"{row.times_less:.3g}"
+            times = f"{row.iterations:,}", f"{1e3 * row.iteration_s:.2f}", short(row.total_s)
+            return *times, degrees(row.mean_deg), degrees(row.median_deg), short(row.times_less)
 
         table = self.table
         heads = ("iterations", "ms an iteration", "s in total", "mean", "median", "times less")
@@ -144,7 +148,7 @@ class Ratio(Comparison):
                 f"The recipe's time is that of an iteration, measured here, times its {table.iterations:,} iterations.",
                 f"The recipe's errors are its {ORACLE}'s (the iterate that ground truth likes best), from "
                 f"{table.curves}.",
-                *self.computed.absences(),
+                *self.computed.remarks(),
             ),
         )
 

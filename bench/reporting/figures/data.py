@@ -76,7 +76,8 @@ class Panel:
 class Chart(Drawing):
     """Panels of series over the same axes, each of a `size` in inches.
 
-    `reading` says a point in words, a format of ``x``, ``y`` and `Series.facts`; `ring` what a ring means.
+    `reading` says a point in words, a format of ``x``, ``y`` and `Series.facts` with d3's specifiers (``~r`` writes no
+    exponent); `ring` what a ring means.
     """
 
     x: Axis
@@ -124,14 +125,82 @@ class Heat(Drawing):
     texts: tuple[tuple[str, ...], ...]
 
 
+@dataclass(frozen=True)
+class Leader:
+    """The line from a method's mean rank on the axis, at height 0, down to `y` and out to `end`, where its name is."""
+
+    look: Look
+    rank: float
+    y: float
+    end: float
+    left: bool
+
+    @property
+    def text(self) -> str:
+        """What stands at its end."""
+        return f"{self.look.label}  {self.rank:.2f}"
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A bar over the mean ranks of methods that are not told apart, at a height."""
+
+    low: float
+    high: float
+    y: float
+
+
+LANE = 0.6  # height of a bar's place, in lines of names
+RULER = 1.7  # above the axis: the bar that is as long as the critical difference
+BAR_BEYOND = 0.06  # ranks by which a bar reaches beyond the methods that it joins
+
+
 @dataclass(frozen=True, eq=False)
 class MeanRanks(Drawing):
-    """Methods by mean rank (k,), and first and last position of the runs that are not told apart.
+    """Methods by mean rank (k,), and first and last position of the runs that are not told apart (Demsar 2006).
 
-    A `difference` of mean ranks is critical.
+    A `difference` of mean ranks is critical. What the diagram is made of is placed here, once for all painters: an axis
+    from rank 1 to k at height 0, bars below it, then a line of names each, the better half at the left.
     """
 
     methods: tuple[Look, ...]
     ranks: Floats
     groups: tuple[tuple[int, int], ...]
     difference: float
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The best and the worst rank."""
+        return 1.0, float(len(self.methods))
+
+    @property
+    def depth(self) -> float:
+        """Height from the axis down to below the last name, in lines."""
+        return (len(self.methods) + 1) // 2 + LANE * len(self.groups) + 0.8
+
+    @property
+    def ruler(self) -> tuple[float, float]:
+        """Ends of the bar as long as the critical difference, which is cut off at the worst rank."""
+        best, worst = self.ends
+        return best, min(best + self.difference, worst)
+
+    @property
+    def bars(self) -> tuple[Bar, ...]:
+        """One for each group."""
+        return tuple(
+            Bar(float(self.ranks[first]) - BAR_BEYOND, float(self.ranks[last]) + BAR_BEYOND, -0.55 - LANE * lane)
+            for lane, (first, last) in enumerate(self.groups)
+        )
+
+    @property
+    def leaders(self) -> tuple[Leader, ...]:
+        """One for each method."""
+        count = len(self.methods)
+        half = (count + 1) // 2
+        found = []
+        for position, (look, rank) in enumerate(zip(self.methods, self.ranks.tolist(), strict=True)):
+            left = position < half
+            level = position if left else count - 1 - position
+            y = -(level + 1.0 + LANE * len(self.groups))
+            found.append(Leader(look, rank, y, self.ends[0 if left else 1], left))
+        return tuple(found)

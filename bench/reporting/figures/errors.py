@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bench.core.problem import Floats
+from bench.core.words import counted
 from bench.reporting.figures.data import QUANTILES, Axis, Chart, Heat, Panel, Series, Spread, Spreads
 from bench.reporting.figures.looks import GREY, Look, Looks
 from bench.reporting.tables.printed import degrees
@@ -99,7 +100,8 @@ def cumulative(run: Run, scenes: Sequence[Scene]) -> Chart:
 def cumulative_overall(run: Run, scenes: Sequence[Scene], standings: Sequence[Standing]) -> Chart:
     """Geometric means over scenes of the same curves, of the methods that ended well on all of them."""
     means = {}
-    for key in (s.key for s in standings if s.complete):
+    complete = {s.key for s in standings if s.complete}
+    for key in (key for key in run.looks if key in complete):
         of_scenes = [quantiles(run.of(scene).get(key, ())) for scene in scenes]
         if all(map(len, of_scenes)):
             means[key] = np.array([geometric_mean(column) for column in np.array(of_scenes).T])
@@ -118,7 +120,7 @@ def _cumulative(run: Run, titles: Sequence[str], curves: Sequence[Mapping[Config
     drawn = np.concatenate([np.ones(1), *(s.x for panel in panels for s in panel.series)])
     axis = Axis("angle (°)", (float(np.percentile(drawn, 2)), float(drawn.max())), log=True)
     share = Axis("cameras under it (%)", (0, 101))
-    reading = "{y:.3g} % of cameras under {x:.3g}°"
+    reading = "{y:.3~r} % of cameras under {x:.3~r}°"
     return Chart("Cumulative errors", what, run.rules, axis, share, panels, reading, (2.2, 1.75))
 
 
@@ -141,7 +143,7 @@ def against_time_overall(run: Run, standings: Sequence[Standing]) -> Chart:
     points = {s.key: (s.seconds, s.median_deg) for s in complete}
     left = [run.looks[s.key].label for s in standings if s.key not in points]
     remark = f" Did not end well on every scene, so left out: {', '.join(left)}." if left else ""
-    remark += f" Geometric means over {max(s.scenes for s in standings)} scenes."
+    remark += f" Geometric means over {counted(max(s.scenes for s in standings), 'scene')}."
     return _against_time(run, [("", points)], remark, (3.4, 2.8))
 
 
@@ -151,7 +153,7 @@ def _against_time(run: Run, panels: Sequence[tuple[str, Points]], remark: str, s
     floored = f" Errors below {FLOOR_DEG:g}° count as {FLOOR_DEG:g}°." if errors.min() <= FLOOR_DEG else ""
     what = f"Lower left is better; {times_note(run.frame)}.{remark}{floored}"
     x, y = Axis("time to solve (s)", _decade(times), log=True), Axis("median error (°)", _decade(errors), log=True)
-    return Chart("Error against time", what, run.rules, x, y, drawn, "{y:.3g}° in {x:.3g} s", size)
+    return Chart("Error against time", what, run.rules, x, y, drawn, "{y:.3~r}° in {x:.3~r} s", size)
 
 
 def _frontier_and_points(looks: Looks, points: Points) -> tuple[Series, ...]:
@@ -182,7 +184,7 @@ def iterations(run: Run, curves: Mapping[Place, Mapping[Configured, Sequence[Cur
     panels = tuple(
         Panel(
             run.title(next(scene for scene in run.scenes if scene.place == place)),
-            tuple(_along(run.looks[key], c, edge) for key, several in by_method.items() for c in several),
+            tuple(_along(run.looks[key], c, edge) for key in run.looks for c in by_method.get(key, ())),
         )
         for place, by_method in curves.items()
     )
@@ -192,7 +194,7 @@ def iterations(run: Run, curves: Mapping[Place, Mapping[Configured, Sequence[Cur
         "is the checkpoint with the smallest mean error against ground truth (oracle): no method can choose it."
     )
     x, y = Axis("iteration", (edge, last * 1.1), log=True), Axis("mean error (°)", _around(errors, 1.3), log=True)
-    reading = "{y:.3g}° at iteration {0}, after {1} s"
+    reading = "{y:.3~r}° at iteration {0}, after {1} s"
     return Chart("Error over iterations", what, run.rules, x, y, panels, reading, (2.3, 1.9), "oracle's pick")
 
 

@@ -78,5 +78,6 @@ def looks(frame: pd.DataFrame) -> dict[Configured, Look]:
 
 
 def looks_by_selection(frame: pd.DataFrame) -> dict[Configured, Look]:
-    """The same, each called by the selection that runs it."""
-    return {key: replace(look, label=label(*key)) for key, look in looks(frame).items()}
+    """The same, each called by the selection that runs it, or by the name that a style file gives it."""
+    wanted = appearance.current()
+    return {key: replace(look, label=wanted.called(*key)) for key, look in looks(frame).items()}

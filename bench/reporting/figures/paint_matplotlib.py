@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from bench.reporting.figures.data import Axis, Chart, Drawing, Heat, MeanRanks, Series, Spread, Spreads
+from bench.reporting.figures.data import RULER, Axis, Chart, Drawing, Heat, Leader, MeanRanks, Series, Spread, Spreads
 from bench.reporting.figures.looks import GREY, Look
 from bench.reporting.figures.style import columns_of, describe, log_axis, panels, styled
 
@@ -142,38 +142,30 @@ def _heat(heat: Heat) -> Figure:
 
 
 def _mean_ranks(drawn: MeanRanks) -> Figure:
-    count = len(drawn.methods)
-    half, lanes = math.ceil(count / 2), len(drawn.groups)
-    low = half + 0.6 * lanes
-    figure, (ax,) = panels(1, 3.2, 0.17 * _lines(drawn.methods) * low + 0.7, ())
-    best, worst = 1.0, float(count)
-    ax.set(xlim=(best, worst), ylim=(-(low + 1.2), 1.6))
+    figure, (ax,) = panels(1, 3.2, 0.17 * _lines(drawn.methods) * drawn.depth + 0.8, ())
+    ax.set(xlim=drawn.ends, ylim=(-drawn.depth, RULER + 0.9))
     ax.xaxis.tick_top()
     ax.spines[:].set_visible(False)
     ax.spines["top"].set(visible=True, position=("data", 0))
     ax.set_yticks([])
     ax.xaxis.set_major_locator(MaxNLocator("auto", integer=True))
     ax.grid(visible=False)
-    for lane, (first, last) in enumerate(drawn.groups):
-        y = -0.55 - 0.6 * lane
-        ends = drawn.ranks[[first, last]] + np.array([-0.06, 0.06])
-        ax.plot(ends, [y, y], color="black", linewidth=2.6, solid_capstyle="butt")
-    for position, (look, rank) in enumerate(zip(drawn.methods, drawn.ranks, strict=True)):
-        left = position < half
-        level = position if left else count - 1 - position
-        _named(ax, look, float(rank), -(level + 1.0 + 0.6 * lanes), left, best if left else worst)
-    shown = min(drawn.difference, worst - best)
-    ax.plot([best, best + shown], [1.2, 1.2], color=GREY, linewidth=1.4, marker="|", markersize=5, clip_on=False)
+    for bar in drawn.bars:
+        ax.plot([bar.low, bar.high], [bar.y, bar.y], color="black", linewidth=2.6, solid_capstyle="butt", clip_on=False)
+    for leader in drawn.leaders:
+        _named(ax, leader)
+    low, high = drawn.ruler
+    ax.plot([low, high], [RULER, RULER], color=GREY, linewidth=1.4, marker="|", markersize=5, clip_on=False)
     text = f"critical difference {drawn.difference:.2f}"
-    ax.text(best, 1.35, text, ha="left", va="bottom", color=GREY, fontsize="small")
+    ax.text(low, RULER + 0.3, text, ha="left", va="bottom", color=GREY, fontsize="small")
     return figure
 
 
-def _named(ax: Axes, look: Look, rank: float, y: float, left: bool, end: float) -> None:
+def _named(ax: Axes, of: Leader) -> None:
     """A method's label beside the axis, joined to its mean rank by a line."""
-    ax.plot([rank, rank, end], [0, y, y], color=look.color, linewidth=0.9, clip_on=False)
+    ax.plot([of.rank, of.rank, of.end], [0, of.y, of.y], color=of.look.color, linewidth=0.9, clip_on=False)
     beside = partial(ax.annotate, textcoords="offset points", va="center", fontsize="small", annotation_clip=False)
-    beside(f"{look.label}  {rank:.2f}", (end, y), (-3 if left else 3, 0), ha="right" if left else "left")
+    beside(of.text, (of.end, of.y), (-3 if of.left else 3, 0), ha="right" if of.left else "left")
 
 
 def _lines(looks: Sequence[Look]) -> int:

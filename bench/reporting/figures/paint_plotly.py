@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Collection
 from typing import Any
 
-from bench.reporting.figures.data import Axis, Chart, Drawing, Heat, MeanRanks, Series, Spreads
+from bench.reporting.figures.data import RULER, Axis, Chart, Drawing, Heat, Leader, MeanRanks, Series, Spreads
 from bench.reporting.figures.looks import GREY, Look
 
 FigureDict = dict[str, Any]  # {"data": [trace, …], "layout": {…}}
@@ -35,6 +35,9 @@ DASHES = {"-": "solid", "--": "dash", ":": "dot", "-.": "dashdot"}
 LOG = {"type": "log", "minorloglabels": "complete", "exponentformat": "none"}
 SHORT = 0.9  # decades
 SPREAD = "Box: quartiles and median; whiskers: 10th and 90th percentile; dashes: the mean."
+CHARACTER, LINE = 6.8, 22  # pixels, of a name
+LEAST_AXIS = 240  # pixels between the names
+MOST_RANKS = 15  # that are written at an axis
 CATEGORIES = {"autorange": "reversed", "automargin": True, "type": "category"}
 
 
@@ -157,7 +160,7 @@ def _heat(heat: Heat) -> FigureDict:
         "name": heat.values,
         "xgap": 2,
         "ygap": 2,
-        "hovertemplate": f"%{{y}}<br>{heat.x} %{{x}}: %{{customdata:.3g}}<extra></extra>",
+        "hovertemplate": f"%{{y}}<br>{heat.x} %{{x}}: %{{customdata:.3~r}}<extra></extra>",
     }
     top = {"side": "top", "type": "category", "showgrid": False, "tickangle": -40 if many else 0}
     layout = {
@@ -172,39 +175,90 @@ def _heat(heat: Heat) -> FigureDict:
 
 
 def _mean_ranks(drawn: MeanRanks) -> FigureDict:
-    labels = [look.label for look in drawn.methods]
+    """The axis at height 0, its ticks above; lines and names are shapes and annotations, which no legend lists."""
+    low, high = -drawn.depth, RULER + 1.2
+    leaders = drawn.leaders
     marks = {
         "type": "scatter",
         "mode": "markers",
         "name": "mean rank",
         "x": drawn.ranks,
-        "y": labels,
+        "y": [0.0] * len(leaders),
+        "text": [leader.look.label for leader in leaders],
         "marker": {
-            "color": [look.color for look in drawn.methods],
-            "symbol": [SYMBOLS.get(look.marker, "circle") for look in drawn.methods],
+            "color": [leader.look.color for leader in leaders],
+            "symbol": [SYMBOLS.get(leader.look.marker, "circle") for leader in leaders],
             "size": 9,
         },
+        "cliponaxis": False,
+        "hovertemplate": "%{text}: mean rank %{x:.2f}<extra></extra>",
     }
     bars = [
         {
             "type": "scatter",
             "mode": "lines",
             "name": "not told apart",
-            "x": [float(drawn.ranks[first])] * (last - first + 1),
-            "y": labels[first : last + 1],
-            "line": {"width": 4, "color": GREY},
-            "opacity": 0.6,
-            "showlegend": k == 0,
+            "x": [bar.low, bar.high],
+            "y": [bar.y, bar.y],
+            "line": {"width": 5, "color": "#000000"},
+            "cliponaxis": False,
+            "hoverinfo": "skip",
         }
-        for k, (first, last) in enumerate(drawn.groups)
+        for bar in drawn.bars
     ]
+    wide = 12 + CHARACTER * max(len(leader.text) for leader in leaders)
     layout = {
-        "xaxis": {"title": {"text": "mean rank"}},
-        "yaxis": CATEGORIES,
-        "height": 140 + 24 * len(labels),
+        "xaxis": {
+            "range": list(drawn.ends),
+            "side": "top",
+            "anchor": "free",
+            "position": -low / (high - low),
+            "dtick": -(-len(leaders) // MOST_RANKS),
+            "tick0": 1,
+            "ticks": "outside",
+            "tickcolor": "#000000",
+            "linecolor": "#000000",
+            "showline": True,
+            "showgrid": False,
+            "zeroline": False,
+            "automargin": False,
+            "fixedrange": True,
+        },
+        "yaxis": {"range": [low, high], "visible": False, "fixedrange": True},
+        "shapes": [shape for leader in leaders for shape in _leader(leader)]
+        + [_straight(*drawn.ruler, RULER, "#000000", 2)],
+        "annotations": [*map(_name, leaders), _difference(drawn)],
+        "height": int(LINE * (high - low)) + 20,
         "showlegend": False,
+        "margin": {"l": wide, "r": wide, "t": 10, "b": 10},
+        "meta": {"width": int(2 * wide + LEAST_AXIS)},
     }
     return {"data": [*bars, marks], "layout": layout}
+
+
+def _leader(leader: Leader) -> list[dict[str, Any]]:
+    """Down from the axis, then out to the name."""
+    down = {"type": "line", "x0": leader.rank, "x1": leader.rank, "y0": 0, "y1": leader.y}
+    return [
+        down | {"line": {"color": leader.look.color, "width": 1.4}, "layer": "below"},
+        _straight(leader.rank, leader.end, leader.y, leader.look.color, 1.4),
+    ]
+
+
+def _straight(start: float, end: float, y: float, color: str, width: float) -> dict[str, Any]:
+    line = {"color": color, "width": width}
+    return {"type": "line", "x0": start, "x1": end, "y0": y, "y1": y, "line": line, "layer": "below"}
+
+
+def _name(leader: Leader) -> dict[str, Any]:
+    side, shift = ("right", -5) if leader.left else ("left", 5)
+    return {"x": leader.end, "y": leader.y, "text": leader.text, "xanchor": side, "xshift": shift, "showarrow": False}
+
+
+def _difference(drawn: MeanRanks) -> dict[str, Any]:
+    text = f"critical difference {drawn.difference:.2f}"
+    place = {"x": drawn.ruler[0], "y": RULER, "xanchor": "left", "yanchor": "bottom", "yshift": 2}
+    return place | {"text": text, "showarrow": False}
 
 
 _PAINTERS: dict[type[Drawing], Callable[..., FigureDict]] = {

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from bench.core.words import counted
 from bench.reporting.figures.data import Axis, Chart, Drawing, Heat, MeanRanks, Panel, Series
 from bench.reporting.figures.errors import FLOOR_DEG, FLOOR_S
 from bench.reporting.figures.looks import Looks
@@ -71,7 +72,7 @@ def profile(frame: pd.DataFrame, table: Blocks, looks: Looks, what: str) -> Char
     found = performance_profiles(table)
     right = min(max(max(float(p.ratios[-1]) for p in found) * 1.2, 2.0), WIDEST_RATIO)
     series = []
-    for p in found:
+    for p in sorted(found, key=lambda p: list(looks).index(p.method)):
         drawn = p.ratios <= right
         x, y = np.append(p.ratios[drawn], right), 100 * np.append(p.shares[drawn], p.shares[drawn][-1])
         series.append(Series(looks[p.method], x, y, kind="steps"))
@@ -84,7 +85,7 @@ def profile(frame: pd.DataFrame, table: Blocks, looks: Looks, what: str) -> Char
         Axis(f"{what}, times that of the best method", (1.0, right), log=True),
         Axis("problems (%)", (0, 102)),
         (Panel("", tuple(series)),),
-        "{y:.3g} % of the problems within {x:.3g} times the best",
+        "{y:.3~r} % of the problems within {x:.3~r} times the best",
         (2.4, 1.9),
     )
 
@@ -93,7 +94,7 @@ def _problems(frame: pd.DataFrame, table: Blocks, looks: Looks) -> str:
     """How many problems there are, what is left out, and the rules."""
     scenes = len(set(table.scenes))
     drawn = len(table.values)
-    of = f"{drawn} scenes" if scenes == drawn else f"{drawn} problems ({scenes} {'scene' if scenes == 1 else 'scenes'})"
+    of = counted(scenes, "scene") if scenes == drawn else f"{drawn} problems ({counted(scenes, 'scene')})"
     out = [looks[method].label for method in table.left_out]
     left = f" Not run on all of them, so left out: {', '.join(out)}." if out else ""
     rule = " and ".join(dict.fromkeys(map(str, frame["alignment"])))

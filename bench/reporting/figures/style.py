@@ -52,9 +52,10 @@ def styled() -> Iterator[None]:
 
 
 def columns_of(count: int) -> int:
-    """Panels beside each other, of `count`."""
+    """Panels beside each other, of `count`: in as few rows as there must be, all as full as can be."""
     width = appearance.current().width_in
-    return min(MOST_COLUMNS, count, max(1, int(width / NARROWEST_PANEL)) if width else count)
+    most = min(MOST_COLUMNS, count, max(1, int(width / NARROWEST_PANEL)) if width else count)
+    return math.ceil(count / math.ceil(count / most))
 
 
 def panels(count: int, width: float, height: float, legend: Sequence[Line2D]) -> tuple[Figure, list[Axes]]:
@@ -94,7 +95,7 @@ def panels(count: int, width: float, height: float, legend: Sequence[Line2D]) ->
 def describe(figure: Figure, title: str, caption: str) -> None:
     """Title above, caption below; in a figure for a paper, which has its own, they are kept but not drawn."""
     drawn = appearance.current().width_in is None
-    lines = textwrap.wrap(caption, int(figure.get_figwidth() * 18))
+    lines = textwrap.wrap(caption.replace(" %", "\u00a0%"), int(figure.get_figwidth() * 18))
     for artist in (
         figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize="large"),
         figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize="small", color=GREY),

@@ -7,7 +7,7 @@ import numpy as np
 
 from bench.core.outcome import OK
 from bench.core.problem import Floats, Instance
-from bench.plugins.selection import label
+from bench.reporting import appearance
 from bench.scoring.metrics.errors import camera_errors
 from bench.scoring.metrics.folds import Fold, find_folds
 from bench.scoring.metrics.oracle import ORACLE
@@ -105,7 +105,7 @@ def gather(store: Store, results: Results, place: Place) -> Case | None:
         solved.append(
             Solved(
                 (row["method"], row["params"]),
-                label(row["method"], row["params"]),
+                appearance.current().called(row["method"], row["params"]),
                 estimate.rotations,
                 estimate.edge_weights,
                 camera_errors(estimate.rotations, truth, results.alignment),

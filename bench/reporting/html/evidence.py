@@ -11,7 +11,7 @@ from bench.reporting.figures.paint_plotly import FigureDict, dash
 from bench.reporting.html import words
 from bench.reporting.html.case import Case, Solved
 from bench.reporting.html.section import Section, Table, Value, anchor
-from bench.reporting.tables.printed import area
+from bench.reporting.tables.printed import area, degrees
 from bench.scoring.metrics.cycles import WRONG_DEG, agreeing_share, sample_cycles
 from bench.scoring.metrics.roc import roc_curve
 
@@ -27,8 +27,9 @@ def cycle_section(case: Case) -> list[Section]:
     if not len(cycles.residuals):
         return []
     closed = 100 * float((cycles.residuals < CLOSED_DEG).mean())
+    median = degrees(float(np.median(cycles.residuals)))
     found = [
-        f"Median residual of a triangle: {np.median(cycles.residuals):.2g}°; {closed:.0f} % close to within "
+        f"Median residual of a triangle: {median}°; {closed:.0f} % close to within "
         f"{CLOSED_DEG:g}° (a random sample of {len(cycles.residuals)})."
     ]
     traces = [_histogram(cycles.residuals, "all triangles", "#0072B2")]
@@ -65,7 +66,7 @@ def _histogram(residuals: Floats, name: str, color: str) -> dict[str, object]:
         "y": 100 * counts / len(residuals),
         "line": {"shape": "hvh", "color": color, "width": 1.5},
         "fill": "tozeroy",
-        "hovertemplate": "%{y:.2g} % at %{x:.3g}°<extra></extra>",
+        "hovertemplate": "%{y:.2~r} % at %{x:.3~r}°<extra></extra>",
     }
 
 

@@ -156,7 +156,7 @@ def _cameras(positions: Ints, colors: Floats, of: str) -> dict[str, Any]:
             "line": {"width": 0.5, "color": GREY},
         },
         "showlegend": False,
-        "hovertemplate": "camera %{pointNumber}<br>%{marker.color:.3g}°<extra></extra>",
+        "hovertemplate": "camera %{pointNumber}<br>%{marker.color:.3~r}°<extra></extra>",
     }
 
 

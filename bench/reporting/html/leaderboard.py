@@ -21,7 +21,7 @@ class Column:
 
     key: str
     head: str
-    kind: str  # text, deg, seconds, percent, number, area
+    kind: str  # text, deg, seconds, percent, number, count, area
     meaning: str
 
 
@@ -46,7 +46,7 @@ COLUMNS = (
     Column("auc", "AUC", "area", "Area under the ROC curve of the edge weights against the true outliers"),
     Column("time", "Time s", "seconds", "Time to solve; over all scenes the geometric mean"),
     Column("speedup", "Times faster", "number", "Than the baseline of the timing run"),
-    Column("memory", "MiB", "number", "What solving added to the resident memory, at its peak"),
+    Column("memory", "MiB", "count", "What solving added to the resident memory, at its peak"),
     Column("cameras", "Cameras", "text", "Solved / scored / all"),
     Column("best_on", "Best on", "text", "Scenes on which it is among the best"),
     Column("outcome", "Outcome", "text", "How the jobs ended"),
@@ -66,27 +66,40 @@ NUMBERS = {
 }  # columns of a run's frame
 
 
+CONSTANT = ("scene", "protocol", "alignment")  # columns that show only where their values differ
+
+
 def leaderboard(by_rule: Mapping[str, Results]) -> dict[str, Any]:
+    """Columns and rows as the page reads them, see `packed`."""
+    return packed(COLUMNS, [row for results in by_rule.values() for row in rows_of(results)], CONSTANT)
+
+
+def packed(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]], constant: Sequence[str]) -> dict[str, Any]:
     """Columns and rows as the page reads them; a column that no row has a value in is left out.
 
     Texts are written once: a column of kind text has its ``values``, and the rows hold their numbers in it.
+
+    Parameters
+    ----------
+    columns, rows
+        The columns, and rows as `rows_of` gives them.
+    constant
+        Keys of columns that show only where their values differ.
     """
-    rows = [row for results in by_rule.values() for row in _rows(results)]
-    columns = [c for c in COLUMNS if any(row.get(c.key) is not None for row in rows)]
-    texts = {c.key: list(dict.fromkeys(row.get(c.key) for row in rows)) for c in columns if c.kind == "text"}
+    shown = [c for c in columns if any(row.get(c.key) is not None for row in rows)]
+    texts = {c.key: list(dict.fromkeys(row.get(c.key) for row in rows)) for c in shown if c.kind == "text"}
     number = {key: {value: k for k, value in enumerate(values)} for key, values in texts.items()}
     return {
-        "columns": [dataclasses.asdict(c) | {"values": texts.get(c.key)} for c in columns],
-        "rows": [
-            [number[c.key][row.get(c.key)] if c.key in number else row.get(c.key) for c in columns] for row in rows
-        ],
+        "columns": [dataclasses.asdict(c) | {"values": texts.get(c.key)} for c in shown],
+        "rows": [[number[c.key][row.get(c.key)] if c.key in number else row.get(c.key) for c in shown] for row in rows],
         "best": [k for k, row in enumerate(rows) if row["best"]],
         "failed": {k: row["failed"] for k, row in enumerate(rows) if row["failed"]},
-        "all": ALL_SCENES,
+        "constant": list(constant),
     }
 
 
-def _rows(results: Results) -> Iterator[dict[str, Any]]:
+def rows_of(results: Results) -> Iterator[dict[str, Any]]:
+    """Every method on every scene of a run, and over all of them where there are several."""
     scenes = scenes_of(results.frame, results.ties)
     ranks: dict[Place, dict[Configured, float]] = {}
     for protocol, rows in results.frame.groupby("protocol", sort=False):

@@ -25,11 +25,11 @@ def overall(results: Results, scenes: Sequence[Scene], standings: Sequence[Stand
     run = errors.Run(results.frame, scenes, results.errors, looks)
     found = []
     if len(known := run.known) > 1:
-        best_first = [s.key for s in standings]
+        best = [looks[s.key].label for s in standings]
         found = [
             _section("time", errors.against_time_overall(run, standings)),
             _section("error-per-scene", errors.by_scene(run, known, standings)),
-            _cumulative("cumulative", errors.cumulative_overall(errors.ordered(run, best_first), known, standings)),
+            _cumulative("cumulative", errors.cumulative_overall(run, known, standings), best),
         ]
     return found + [_section(name, drawing, drawing.rules) for name, drawing in rankings(results.frame, looks).items()]
 
@@ -41,12 +41,14 @@ def of_scene(
     points = {key: q for key, e in run.of(scene).items() if len(q := errors.quantiles(e))}
     if not points:
         return []
-    own = errors.ordered(run, sorted(points, key=lambda key: float(points[key][MIDDLE])))
+    best = sorted(points, key=lambda key: float(points[key][MIDDLE]))
     name = "-".join(scene.place)
+    spread = errors.spreads(errors.ordered(run, best), [scene])
+    curves_of_errors = errors.cumulative(errors.ordered(run, [key for key in run.looks if key in points]), [scene])
     found = [
-        _section(anchor("time", name), errors.against_time(own, [scene])),
-        _section(anchor("spread", name), replace(errors.spreads(own, [scene]), title="Errors of the cameras")),
-        _cumulative(anchor("cumulative", name), errors.cumulative(own, [scene])),
+        _section(anchor("time", name), errors.against_time(run, [scene])),
+        _section(anchor("spread", name), replace(spread, title="Errors of the cameras")),
+        _cumulative(anchor("cumulative", name), curves_of_errors, [run.looks[key].label for key in best]),
     ]
     if scene.place in curves:
         along = errors.iterations(run, {scene.place: curves[scene.place]})
@@ -59,8 +61,10 @@ def _section(name: str, drawing: Drawing, *more: str) -> Section:
     return Section(name, drawing.title, tuple(filter(None, (*how, drawing.caption, *more))), paint(drawing))
 
 
-def _cumulative(name: str, chart: Chart) -> Section:
-    labels = [s.look.label for s in chart.panels[0].series]
+def _cumulative(name: str, chart: Chart, best_first: Sequence[str]) -> Section:
+    """A section of cumulative curves; the legend keeps the order of all others, only the best are shown at first."""
+    drawn = {s.look.label for s in chart.panels[0].series}
+    labels = [label for label in best_first if label in drawn]
     hidden = f" The best {SHOWN} of {len(labels)} are shown; the legend switches the others on."
     caption = f"{chart.caption}{hidden if len(labels) > SHOWN else ''}"
     return Section(name, chart.title, (caption,), paint(chart, labels[:SHOWN]))

@@ -1,25 +1,23 @@
 """The whole page: gathers the sections, embeds data, style, script and plotly, and writes one file."""
 
-import base64
-import hashlib
-import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
+from bench.core.words import counted
+from bench.reporting import appearance
 from bench.reporting.figures.errors import Run
 from bench.reporting.figures.looks import looks_by_selection
 from bench.reporting.html import overview, reversals, words
+from bench.reporting.html.document import asset, document
 from bench.reporting.html.embed import compact
 from bench.reporting.html.failures import failures, notes
 from bench.reporting.html.leaderboard import leaderboard
 from bench.reporting.html.origin import origin
 from bench.reporting.html.scene import sections as forensics
-from bench.reporting.html.section import Section, Value, anchor
+from bench.reporting.html.section import Section, anchor
 from bench.reporting.tables.rows import Scene, is_timed
 from bench.reporting.tables.rows import scenes as scenes_of
 from bench.reporting.tables.standing import overall
@@ -62,6 +60,8 @@ def write_report(store: Store, by_rule: Mapping[str, Results], path: Path) -> Pa
 
 def render(store: Store, by_rule: Mapping[str, Results]) -> str:
     """Text of the page."""
+    wanted = appearance.current()
+    by_rule = {rule: replace(found, frame=wanted.ordered(found.frame)) for rule, found in by_rule.items()}
     results = next(iter(by_rule.values()))
     by_scene = {rule: scenes_of(r.frame, r.ties) for rule, r in by_rule.items()}
     scenes = by_scene[results.alignment]
@@ -72,7 +72,9 @@ def render(store: Store, by_rule: Mapping[str, Results]) -> str:
     data = {"leaderboard": leaderboard(by_rule)} | {
         f"figure-{s.id}": compact(s.figure) for s in [*sections, *(s for p in pages for s in p.sections)] if s.figure
     }
-    return _html(
+    return document(
+        "page.html",
+        scripts=[asset("theme.js"), _plotly(), *map(asset, ("common.js", "leaderboard.js", "figures.js"))],
         title=f"{', '.join(suites)}: rotation synchronization",
         summary=words.summary(headline, standing, is_timed(results.frame)),
         flags=_flags(by_rule, by_scene, scenes),
@@ -133,7 +135,7 @@ def _facts(scene: Scene) -> str:
     """One line: cameras, who is best, what failed."""
     best = [e for e in scene.entries if e.best]
     failed = sum(failed.seeds for e in scene.entries for failed in e.failures)
-    parts = [words.count(scene.cameras, "camera")]
+    parts = [counted(scene.cameras, "camera")]
     if best:
         parts.append(f"best: {words.enumeration([e.label for e in best])}")
     if failed:
@@ -151,63 +153,8 @@ def _unique(name: str, used: set[str]) -> str:
     return found
 
 
-def _html(data: Mapping[str, Any], **content: Any) -> str:
-    """The page of these data, with what its template says of the `content`."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from jinja2.utils import htmlsafe_json_dumps
-    from markupsafe import Markup
-
-    environment = Environment(
-        loader=PackageLoader("bench.reporting.html"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["cell"] = cell
-    scripts = [_asset("theme.js"), _plotly(), _asset("page.js")]
-    embedded = {key: htmlsafe_json_dumps(value, dumps=_dumps) for key, value in data.items()}
-    return environment.get_template("page.html").render(
-        **content,
-        data=embedded,
-        policy=_policy(scripts),
-        style=Markup(_asset("style.css")),
-        scripts=[Markup(script) for script in scripts],
-    )
-
-
-def cell(value: Value) -> str:
-    """A value as a small table prints it."""
-    if isinstance(value, float):
-        return f"{value:.3g}" if value == value else "–"
-    return "–" if value is None else str(value)
-
-
-def _dumps(value: Any, **_: Any) -> str:
-    return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-
-
-def _policy(scripts: Iterable[str]) -> str:
-    """Content security policy: only our own scripts run, and nothing is loaded from anywhere.
-
-    Scripts are allowed by their hash, so that even markup that got past the escaping could not run. Plotly compiles its
-    WebGL shaders with ``eval``.
-    """
-    hashes = " ".join(
-        f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'" for script in scripts
-    )
-    return (
-        f"default-src 'none'; script-src 'unsafe-eval' {hashes}; style-src 'unsafe-inline'; "
-        "img-src data: blob:; base-uri 'none'; form-action 'none'"
-    )
-
-
 @cache
 def _plotly() -> str:
     from plotly.offline import get_plotlyjs
 
     return str(get_plotlyjs())
-
-
-def _asset(name: str) -> str:
-    return files("bench.reporting.html").joinpath("templates", name).read_text(encoding="utf-8")

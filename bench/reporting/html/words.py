@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
+from bench.core.words import counted
 from bench.reporting.html.reversals import Reversal
 from bench.reporting.tables.printed import degrees
 from bench.reporting.tables.rows import Entry, Scene
@@ -33,8 +34,8 @@ def what_was_compared(scenes: Sequence[Scene]) -> str:
     instances = len({(s.dataset, s.instance) for s in scenes})
     rules = f"alignment {scenes[0].alignment}, protocol {enumeration(protocols)}" if scenes else ""
     return (
-        f"{count(methods, 'method')} on {count(instances, 'scene')} of {enumeration(datasets)}, "
-        f"{count(seeds, 'seed')}; {rules}."
+        f"{counted(methods, 'method')} on {counted(instances, 'scene')} of {enumeration(datasets)}, "
+        f"{counted(seeds, 'seed')}; {rules}."
     )
 
 
@@ -58,7 +59,7 @@ def who_is_best(scenes: Sequence[Scene], standings: Sequence[Standing]) -> list[
     if not leading:
         return [f"{where}, no method ended well."]
     parts = [f"{s.label} on {len(s.best_on)}" for s in leading[:NAMED]]
-    rest = f", and {count(len(leading) - NAMED, 'other method')} on fewer" if len(leading) > NAMED else ""
+    rest = f", and {counted(len(leading) - NAMED, 'other method')} on fewer" if len(leading) > NAMED else ""
     named = ", ".join(parts) if rest else enumeration(parts)
     return [f"{where}, no method is among the best everywhere: {named}{rest}."]
 
@@ -186,11 +187,6 @@ def _order_depends(what: str, found: Sequence[Reversal]) -> str:
         f"The order of the methods depends on the {what}: on {clearest.scene}, {clearest.ahead} is ahead of "
         f"{clearest.behind} under {under} ({a}° against {b}°) and behind it under {other} ({c}° against {d}°).{more}"
     )
-
-
-def count(number: int, noun: str) -> str:
-    """``1 scene``, ``5 scenes``."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def enumeration(names: Sequence[str]) -> str:

@@ -4,10 +4,12 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from bench.plugins.selection import label
+from bench.core.words import counted
+from bench.reporting import appearance
 from bench.reporting.tables.grid import ABSENT, Cell, Grid
-from bench.reporting.tables.printed import degrees, exact_seconds
-from bench.scoring.comparison import IDENTICAL, TIME, Comparison
+from bench.reporting.tables.printed import degrees, exact_seconds, p_value
+from bench.scoring.comparison import Comparison
+from bench.scoring.paired import IDENTICAL, TIME
 
 WORDS = {"all": "all methods", "method": "over all scenes"}
 HEADS = ("first", "second", "ratio", "95 % interval", "p", "verdict")
@@ -28,7 +30,7 @@ def comparison_grid(found: Comparison, alignment: str, threshold: float) -> Grid
     shown = rows[told | ((rows["level"] != "scene") & (rows["verdict"] != IDENTICAL))]
     several = rows.loc[rows["level"] == "scene", "instance"].nunique() > 1
     return Grid(
-        caption=f"{found.cells} jobs compared; errors in degrees, {alignment} alignment",
+        caption=f"{counted(found.cells, 'job')} compared; errors in degrees, {alignment} alignment",
         facts=("Method", "on", "of"),
         methods=tuple((head, "") for head in HEADS),
         rows=tuple(_row(row) for row in shown.itertuples() if several or row.level != "all"),
@@ -58,14 +60,14 @@ def _row(row: "object") -> tuple[tuple[str, ...], tuple[Cell, ...]]:
         value(new),
         f"{ratio:.3f}",
         f"{low:.3f} to {high:.3f}" if known else ABSENT,
-        ABSENT if p != p else "< 0.001" if p < 0.001 else f"{p:.3f}",
+        p_value(p),
     )
     facts = (_label(row), instance if level == "scene" else WORDS[level], quantity)
     return facts, (*map(Cell, cells), Cell(word, word == "worse"))
 
 
 def _label(row: "object") -> str:
-    return label(str(row.method), str(row.params))  # type: ignore[attr-defined]
+    return appearance.current().called(str(row.method), str(row.params))  # type: ignore[attr-defined]
 
 
 def _legend(found: Comparison, threshold: float) -> Iterator[str]:

@@ -5,16 +5,30 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import pandas as pd
 from rich import box
-from rich.console import Console, Group, RenderableType
+from rich.console import Console, RenderableType
+from rich.measure import Measurement
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from bench.reporting.tables.grid import Grid
+from bench.core.words import counted
+from bench.reporting.tables.grid import Grid, named_facts, parts_of
 from bench.reporting.tables.printed import area, degrees, exact_seconds, seconds, speedup
-from bench.reporting.tables.rows import ROC_LEGEND, TIE_LEGEND, Entry, Scene, Ties, is_timed, scenes, times_note
+from bench.reporting.tables.rows import (
+    HARDNESS_LEGEND,
+    ROC_LEGEND,
+    SEEDS_LEGEND,
+    TIE_LEGEND,
+    Entry,
+    Scene,
+    Ties,
+    is_timed,
+    scenes,
+    times_note,
+)
 
 NO_TRUTH = " · no ground truth: edge residuals, not errors"
+UNBOUNDED = 10_000  # columns
 WIDE = 98  # columns from which the 90th percentile and the shares under 5 and 10 degrees fit
 
 
@@ -26,14 +40,25 @@ def render_console(
     blocks = [part for scene in scenes(frame, ties) for part in _block(scene, width, timed)]
     legend = (Text(line, style="dim") for line in _legend(frame))
     notes = [Text(), *(Text(f"- {note}") for note in footnotes)] if footnotes else []
-    return _printed(Group(*blocks, *legend, *notes), width, terminal)
+    return _printed([*blocks, *legend, *notes], width, terminal)
 
 
 def render_grid(grid: Grid, *, width: int = 100, terminal: bool = False) -> str:
-    """Text of a table of another shape; what is bold is marked with an asterisk too."""
+    """Text of a table of another shape; what is bold is marked with an asterisk too.
+
+    On a terminal that it is too wide for, it is printed in parts, the columns of facts in each.
+    """
+    counts = range(1, len(grid.methods) + 1) if terminal else ()
+    split = (parts_of(grid, count) for count in counts)
+    parts = next((some for some in split if max(_natural(_grid_table(part)) for part in some) <= width), [grid])
+    tables = [piece for part in parts for piece in (Text(part.caption, style="bold"), _grid_table(part))]
+    return _printed([*tables, *(Text(line, style="dim") for line in grid.notes)], width, terminal)
+
+
+def _grid_table(grid: Grid) -> Table:
     table = _empty_table()
-    for name in grid.facts:
-        table.add_column(name, justify="left" if name in grid.facts[:1] else "right", overflow="fold")
+    for name, named in zip(grid.facts, named_facts(grid), strict=True):
+        table.add_column(name, justify="left" if named else "right", overflow="fold")
     for title, params in grid.methods:
         table.add_column("\n".join(filter(None, (title, *params.split(",")))), justify="right", overflow="fold")
     marks = any(cell.bold for _, cells in grid.rows for cell in cells)
@@ -41,19 +66,27 @@ def render_grid(grid: Grid, *, width: int = 100, terminal: bool = False) -> str:
         shown = (f"{c.text}{('*' if c.bold else ' ') if marks else ''}" for c in cells)
         ends = k + 1 == len(grid.rows) or bool(grid.rows[k + 1][0][0])
         table.add_row(*map(Text, facts), *map(Text, shown), end_section=ends and not facts[0])
-    notes = (Text(line, style="dim") for line in grid.notes)
-    return _printed(Group(Text(grid.caption, style="bold"), table, *notes), width, terminal)
+    return table
 
 
-def _printed(drawn: RenderableType, width: int, terminal: bool) -> str:
+def _natural(table: RenderableType) -> int:
+    """Columns that nothing is broken in."""
+    wide = Console(width=UNBOUNDED)
+    return Measurement.get(wide, wide.options, table).maximum
+
+
+def _printed(pieces: Iterable[RenderableType], width: int, terminal: bool) -> str:
+    """Text of the pieces; in a file a table is as wide as it needs, so that no name is broken in two."""
     console = Console(width=width, force_terminal=terminal, color_system="standard" if terminal else None)
     with console.capture() as capture:
-        console.print(drawn)
+        for piece in pieces:
+            console.width = width if terminal or not isinstance(piece, Table) else max(width, _natural(piece))
+            console.print(piece)
     return "\n".join(line.rstrip() for line in capture.get().splitlines()) + "\n"
 
 
 def _block(scene: Scene, width: int, timed: bool) -> Iterator[RenderableType]:
-    facts = [f"{scene.cameras} cameras"]
+    facts = [counted(scene.cameras, "camera")]
     if math.isfinite(scene.edges_percent):
         facts.append(f"{scene.edges_percent:.1f} % of edges")
     if math.isfinite(scene.hardness):
@@ -150,8 +183,10 @@ def _legend(frame: pd.DataFrame) -> list[str]:
         f"errors in degrees over the scored cameras after {rules} alignment; {times_note(frame)}; "
         "cameras: solved / scored / all",
     ]
+    if "hardness" in frame and frame["hardness"].notna().any():
+        lines.append(HARDNESS_LEGEND)
     if frame["seed"].nunique() > 1:
-        lines.append("means over the seeds that ended well, ± half-width of the 95 % t interval over seeds")
+        lines.append(SEEDS_LEGEND)
     if "roc_auc" in frame and frame["roc_auc"].notna().any():
         lines.append(f"AUC: {ROC_LEGEND}")
     return lines

@@ -6,13 +6,24 @@
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pandas as pd
 
 from bench.reporting import appearance
 from bench.reporting.tables.printed import area, degrees, exact_seconds, speedup
-from bench.reporting.tables.rows import ROC_LEGEND, TIE_LEGEND, Entry, Scene, Ties, scenes, times_note
+from bench.reporting.tables.rows import (
+    HARDNESS_LEGEND,
+    ROC_LEGEND,
+    SEEDS_LEGEND,
+    TIE_LEGEND,
+    Entry,
+    Scene,
+    Ties,
+    Value,
+    scenes,
+    times_note,
+)
 from bench.scoring.results import Configured
 
 ABBREVIATIONS = {
@@ -29,6 +40,7 @@ UNKNOWN = "n/t"
 PARTIAL = "†"
 ABSENT = "–"
 ROC = "ROC AUC"
+_NUMBER = re.compile(r"[−+-]?[\d.,]*(?: %)?|–")
 TIME, FASTER = "median / min s", "times faster"
 
 
@@ -69,12 +81,33 @@ class Grid:
     measure: str = ""
 
 
+def named_facts(grid: Grid) -> list[bool]:
+    """Which columns of facts hold names, set at the left, and not numbers: the first, and others by most cells."""
+    cells = [[facts[k] for facts, _ in grid.rows] for k in range(len(grid.facts))]
+    return [k == 0 or 2 * sum(_NUMBER.fullmatch(c) is None for c in own) > len(own) for k, own in enumerate(cells)]
+
+
+def parts_of(grid: Grid, count: int) -> list[Grid]:
+    """The same table in equal parts, the facts in each; the notes go below the last."""
+    size = -(-len(grid.methods) // count)
+    return [
+        replace(
+            grid,
+            caption=f"{grid.caption} (part {part + 1} of {count})" if count > 1 else grid.caption,
+            methods=grid.methods[part * size : (part + 1) * size],
+            rows=tuple((facts, cells[part * size : (part + 1) * size]) for facts, cells in grid.rows),
+            notes=grid.notes if part == count - 1 else (),
+        )
+        for part in range(count)
+    ]
+
+
 def markdown(tables: Sequence[Grid], footnotes: Sequence[str] = ()) -> str:
     """Markdown tables, notes below each and the footnotes at the end."""
     parts = []
     for grid in tables:
         header = [*grid.facts, *(f"{title} {params}".strip() for title, params in grid.methods)]
-        align = [":--", *("--:" for _ in grid.facts[1:]), *(":-:" for _ in grid.methods)]
+        align = [*(":--" if named else "--:" for named in named_facts(grid)), *(":-:" for _ in grid.methods)]
         lines = [_pipes(map(markdown_escape, header)), _pipes(align)]
         for facts, cells in grid.rows:
             shown = (f"**{markdown_escape(c.text)}**" if c.bold else markdown_escape(c.text) for c in cells)
@@ -141,7 +174,7 @@ def _cell(scene: Scene, entry: Entry | None) -> Cell:
         return Cell("/".join(ABBREVIATIONS.get(ended, ended) for ended in entry.outcomes))
     if not scene.has_truth:
         return Cell(UNKNOWN)
-    mean, median = (_short(entry.values[name].mean) for name in ("mean_deg", "median_deg"))
+    mean, median = (_with_spread(entry.values[name]) for name in ("mean_deg", "median_deg"))
     most = max(e.scored for e in scene.entries)
     marks = PARTIAL * (entry.scored < most) + f" ({entry.ok}/{entry.seeds})" * (entry.ok < entry.seeds)
     return Cell(f"{mean} / {median}{marks}", entry.best)
@@ -153,6 +186,13 @@ def _time(entry: Entry) -> str:
 
 def _area(entry: Entry) -> str:
     return area(entry.value("roc_auc").mean)
+
+
+def _with_spread(value: Value) -> str:
+    """A mean over seeds and the half-width of its interval, where there are several."""
+    return (
+        f"{_short(value.mean)} ±{_short(value.half_width)}" if math.isfinite(value.half_width) else _short(value.mean)
+    )
 
 
 def _short(value: float) -> str:
@@ -177,12 +217,14 @@ def _notes(group: Sequence[Scene], cells: Sequence[str]) -> list[str]:
     counted = re.search(r"\(\d+/\d+\)", text) is not None
     marks = [f"{mark}: {meaning}" for mark, meaning in legend.items() if mark in text]
     marks += ["(k/s): only k of s seeds ended well"] if counted else []
+    if any(math.isfinite(scene.hardness) for scene in group):
+        marks.append(HARDNESS_LEGEND)
     if any(scene.has_roc for scene in group):
         marks.append(f"{ROC}: {ROC_LEGEND}")
     used = set(re.split(r"[ /]", text))
     marks += [f"{short}: {name}" for name, short in ABBREVIATIONS.items() if short in used]
     if any(e.seeds > 1 for scene in group for e in scene.entries):
-        marks.append("figures are means over seeds")
+        marks.append(SEEDS_LEGEND)
     notes += [f"{'; '.join(marks)}."] if marks else []
     remarks = [
         (entry.label, remark, scene.instance)

@@ -3,9 +3,8 @@ r"""Tables for a paper: booktabs, heads that span columns, and text that TeX pri
 import itertools
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
-from bench.reporting.tables.grid import Cell, Grid
+from bench.reporting.tables.grid import Cell, Grid, named_facts, parts_of
 
 PAGE_PT = 515.0  # what a page of two columns has, 7.16 inches
 CHARACTER_PT, GAP_PT = 4.0, 6.0  # of type as small as ours
@@ -83,22 +82,8 @@ def latex_escape(text: str) -> str:
 def _split(grid: Grid) -> list[Grid]:
     """The same table in equal parts that fit a page's width; the notes go below the last."""
     most = max(len(grid.methods), 1)
-    tried = (_parts(grid, count) for count in range(1, most + 1))
+    tried = (parts_of(grid, count) for count in range(1, most + 1))
     return next(parts for parts in tried if len(parts) == most or max(map(_width_pt, parts)) <= PAGE_PT)
-
-
-def _parts(grid: Grid, count: int) -> list[Grid]:
-    size = -(-len(grid.methods) // count)
-    return [
-        replace(
-            grid,
-            caption=f"{grid.caption} (part {part + 1} of {count})" if count > 1 else grid.caption,
-            methods=grid.methods[part * size : (part + 1) * size],
-            rows=tuple((facts, cells[part * size : (part + 1) * size]) for facts, cells in grid.rows),
-            notes=grid.notes if part == count - 1 else (),
-        )
-        for part in range(count)
-    ]
 
 
 def _width_pt(grid: Grid) -> float:
@@ -167,7 +152,8 @@ def _long(grid: Grid) -> list[bool]:
 
 def _columns(grid: Grid) -> str:
     lines = rf">{{\raggedright\arraybackslash}}p{{{LINE_PT:g}pt}}"
-    return "".join(lines if long else "r" if k else "l" for k, long in enumerate(_long(grid)))
+    named = named_facts(grid)
+    return "".join(lines if long else "l" if name else "r" for long, name in zip(_long(grid), named, strict=True))
 
 
 def _over(columns: int, text: str) -> str:

@@ -109,16 +109,16 @@ def _unknown(style: str) -> InputError:
 
 
 def text_of(
-    grid: "Grid", frame: pd.DataFrame, style: str, *, width: int = 100, terminal: bool = False
+    grids: "Sequence[Grid]", frame: pd.DataFrame, style: str, *, width: int = 100, terminal: bool = False
 ) -> tuple[str, tuple[str, ...]]:
-    """Another table in a format, with the frame behind it for ``csv``; and the notes that are not in it (then all)."""
+    """Other tables in a format, with the frame behind them for ``csv``; and the notes that are not in it (then all)."""
     if style == "csv":
-        return frame.to_csv(index=False), grid.notes
+        return frame.to_csv(index=False), tuple(note for grid in grids for note in grid.notes)
     if style == "console":
         from bench.reporting.tables.console import render_grid
 
-        return render_grid(grid, width=width, terminal=terminal), ()
-    return _written([grid], style), ()
+        return "\n".join(render_grid(grid, width=width, terminal=terminal) for grid in grids), ()
+    return _written(grids, style), ()
 
 
 def _written(tables: "Sequence[Grid]", style: str, footnotes: Sequence[str] = ()) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from bench.core import outcome
-from bench.plugins.selection import label
+from bench.reporting import appearance
 from bench.scoring.inference.statistics import seed_half_width
 from bench.scoring.results import Configured, Place
 
@@ -86,8 +86,8 @@ class Entry:
 
     @property
     def label(self) -> str:
-        """The selection that runs it: ``shonan[loss=huber]``."""
-        return label(self.method, self.params)
+        """The selection that runs it, ``shonan[loss=huber]``, or the name that a style file gives it."""
+        return appearance.current().called(self.method, self.params)
 
     @property
     def outcomes(self) -> tuple[str, ...]:
@@ -157,6 +157,11 @@ _VALUES = (
     "speedup_low",
     "speedup_high",
     "roc_auc",
+)
+SEEDS_LEGEND = "means over the seeds that ended well, ± half-width of the 95 % t interval over seeds"
+HARDNESS_LEGEND = (
+    "hardness: second smallest eigenvalue of the graph's Laplacian over the number of cameras; lower is harder, "
+    "0 is not connected"
 )
 ROC_LEGEND = "area under the ROC curve of a method's edge weights against the true outliers; 1 tells all of them apart"
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from bench.core.words import counted
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -39,20 +41,20 @@ def workers_of(planned: "Run") -> int:
     return 1 if planned.options.timing else planned.options.jobs or os.cpu_count() or 1
 
 
-def foreseen(planned: "Run") -> str:
-    """How long the run will take, going by earlier records, in a sentence."""
+def foreseen(planned: "Run", *further: "Run") -> str:
+    """How long a run will take, and others after it in the same folder, going by earlier records, in a sentence."""
     from bench.running.progress.pace import remaining_s, span
     from bench.running.progress.past import Past
 
-    past = Past(planned)
-    tasks = [past.task(cell.job) for cell in planned.todo]
+    past = Past(planned, *further)
+    tasks = [past.task(cell.job) for run in (planned, *further) for cell in run.todo]
     workers = workers_of(planned)
     left = remaining_s(past.pace, tasks, workers=workers)
     if left is None:
         return "time: unknown, for there is no earlier record of any of these methods"
     unknown = sorted({task.method for task in tasks if not past.pace.knows(task)})
     guess = f"; {', '.join(unknown)} without any, taken as like the others" if unknown else ""
-    return f"time: about {span(left)}, {workers} at a time, going by {past.pace.seen} earlier records{guess}"
+    return f"time: about {span(left)}, {workers} at a time, going by {counted(past.pace.seen, 'earlier record')}{guess}"
 
 
 def _plain(planned: "Run", console: "Console") -> None:
@@ -95,7 +97,7 @@ def _live(planned: "Run", console: "Console") -> None:
     ended = ", ".join(
         f"{count} {name}" for name, count in sorted(outcomes.items(), key=lambda kind: kind[0] != outcome.OK)
     )
-    console.print(f"{len(jobs)} jobs in {span(board.elapsed_s)}: {ended}", markup=False)
+    console.print(f"{counted(len(jobs), 'job')} in {span(board.elapsed_s)}: {ended}", markup=False)
 
 
 def _print(console: "Console", lines: list[str]) -> None:

@@ -22,15 +22,15 @@ class Past:
 
     Parameters
     ----------
-    planned
-        The run whose jobs are to be timed.
+    planned, further
+        The run whose jobs are to be timed, and others in the same folder.
     """
 
-    def __init__(self, planned: Run) -> None:
+    def __init__(self, planned: Run, *further: Run) -> None:
         self.stores = [planned.store, *_beside(planned.store.folder)]
         self.pace = Pace()
         self._sizes: dict[str, float] = {}
-        wanted = {cell.job.method for cell in planned.cells}
+        wanted = {cell.job.method for run in (planned, *further) for cell in run.cells}
         for store in self.stores:
             by_method: dict[str, list[Job]] = {}
             with contextlib.suppress(InputError):  # plans that cannot be read tell nothing

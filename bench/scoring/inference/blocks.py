@@ -54,7 +54,7 @@ class Blocks:
         return len(self.methods) > 1 and len(self.values) >= LEAST_BLOCKS
 
 
-_DID_NOT_RUN = (outcome.NOT_INSTALLED, outcome.NOT_RUN)
+DID_NOT_RUN = (outcome.NOT_INSTALLED, outcome.NOT_RUN)
 
 
 def headline(frame: "pd.DataFrame") -> "pd.DataFrame":
@@ -117,7 +117,7 @@ def _table(frame: "pd.DataFrame", column: str, floor: float) -> _Table:
     instances = frame.groupby([*_PLACE, "protocol"])["instance_key"].transform("nunique")
     draw = frame["seed"].where(instances > 1, -1)  # the seed where the instance changes with it
     rows = frame[["dataset", "instance", "method", "params"]].assign(draw=draw, value=value.fillna(np.inf))
-    rows = rows[(most > 0) & ~frame["outcome"].isin(_DID_NOT_RUN)]
+    rows = rows[(most > 0) & ~frame["outcome"].isin(DID_NOT_RUN)]
     means = rows.groupby([*_PLACE, "draw", "method", "params"], sort=False)["value"].mean()
     keys = [(str(d), str(i), int(draw), str(m), str(p)) for d, i, draw, m, p in means.index]
     problems, methods = list(dict.fromkeys(k[:3] for k in keys)), list(dict.fromkeys(k[3:] for k in keys))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -86,6 +86,10 @@ class CurvePlot(MeasuredItem):
             methods.setdefault(datasets, []).append(curve.method)
         return tuple(self.suite(name, datasets, texts) for datasets, texts in methods.items())
 
+    def with_methods(self, methods: Sequence[str]) -> "CurvePlot":
+        """The figure with a curve for each of these, under its selection."""
+        return replace(self, curves=(*self.curves, *(Curve(text, text) for text in methods)))
+
     def compare(self, sources: Sources, computed: Computed) -> "Curves":
         """The points of every curve; nothing is published in numbers."""
         points = tuple(
@@ -96,7 +100,7 @@ class CurvePlot(MeasuredItem):
         return Curves(self, points, computed)
 
     def _point(self, curve: Curve, panel: int | float, x: int | float, dataset: str, computed: Computed) -> "Point":
-        method = label("method", curve.method) if curve.method else ""
+        method = computed.spelled(curve.method) if curve.method else ""
         if method:
             found = [score for score in computed.scores if (score.dataset, score.method) == (dataset, method)]
             well = [score for score in found if score.ok]

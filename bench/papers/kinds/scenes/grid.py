@@ -3,10 +3,10 @@
 import math
 from collections.abc import Iterator, Mapping
 
-from bench.papers.kinds.scenes.table import NO_TRUTH, NOT_ON_DISK, PUBLISHED_ONLY, Measured, Scenes
+from bench.papers.kinds.scenes.table import NO_TRUTH, NOT_IN_PAPER, NOT_ON_DISK, PUBLISHED_ONLY, Measured, Scenes
 from bench.papers.published import FACTS
-from bench.plugins import selection
 from bench.reporting.tables.grid import ABBREVIATIONS, ABSENT, UNKNOWN, Cell, Grid, abbreviated, gathered
+from bench.reporting.tables.rows import HARDNESS_LEGEND
 
 HEADS = {"n_cameras": "Cameras", "edges_percent": "Edges %", "hardness": "Hardness"}
 _DIGITS = {"n_cameras": 0, "edges_percent": 1, "hardness": 4}
@@ -37,7 +37,7 @@ def scene_grid(found: Scenes) -> Grid:
     return Grid(
         caption=f"{found.table.title}; {found.computed.alignment} alignment, {found.table.dataset}",
         facts=("Scene", "", *(HEADS[fact] for fact in FACTS)),
-        methods=tuple((column, _parameters(method)) for column, method in columns),
+        methods=tuple(head_of(column, method) for column, method in columns),
         rows=tuple(rows),
         notes=tuple(scene_notes(found, marks)),
     )
@@ -73,12 +73,11 @@ def scene_notes(found: Scenes, marks: Mapping[str, tuple[str, str]], highlighted
     legend += [f"{UNKNOWN}: solved, but no camera has ground truth"] if NO_TRUTH in statuses else []
     used = set(map(abbreviated, statuses))
     legend += [f"{short}: {name}" for name, short in ABBREVIATIONS.items() if short in used]
-    if legend:
-        yield f"{'; '.join(legend)}."
+    yield f"{'; '.join([*legend, HARDNESS_LEGEND])}."
     scores = found.computed.scores
     yield from gathered((score.method, score.status, score.instance) for score in scores if not score.ok)
     yield from gathered((score.method, score.notes, score.instance) for score in scores if score.notes)
-    yield from found.computed.absences()
+    yield from found.computed.remarks()
 
 
 def error_text(row: Measured) -> str:
@@ -100,6 +99,7 @@ def _signed(value: float, digits: int) -> str:
     return text[1:] if float(text.replace("−", "-")) == 0 else text
 
 
-def _parameters(method: str) -> str:
-    """What a head says of a measured method besides the published column's name."""
-    return selection.format_parameters(selection.parse(method).combinations()[0]) if method else ""
+def head_of(column: str, method: str) -> tuple[str, str]:
+    """Title and parameters over a column: that of the paper, or the method itself where the paper has none."""
+    name, _, params = method.removesuffix("]").partition("[")
+    return (name if column == NOT_IN_PAPER else column), params

@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from bench.papers.kinds.scenes.grid import HEADS, error_text, marked, marks_of, scene_notes
-from bench.papers.kinds.scenes.table import NOT_ON_DISK, Measured, Scenes
+from bench.papers.kinds.scenes.grid import HEADS, error_text, head_of, marked, marks_of, scene_notes
+from bench.papers.kinds.scenes.table import NOT_IN_PAPER, NOT_ON_DISK, Measured, Scenes
 from bench.papers.published import FACTS
 from bench.reporting.tables.grid import ABSENT, Cell, Grid
 
@@ -46,6 +46,9 @@ def side_by_side(found: Scenes) -> Grid:
 
 
 def _heads(quantity: str, methods: Sequence[str]) -> Iterator[tuple[str, str]]:
+    if quantity == NOT_IN_PAPER:
+        yield from (head_of(quantity, method) for method in methods)
+        return
     for method in filter(None, methods):
         params = method.partition("[")[2].removesuffix("]")
         yield quantity, f"{HERE},{params}" if params else HERE
@@ -56,7 +59,8 @@ def _cells(rows: Sequence[Measured]) -> Iterator[Cell]:
     for row in rows:
         if row.method:
             yield Cell(ABSENT if row.status == NOT_ON_DISK else error_text(row), highlight=row.near_measured)
-    yield Cell(rows[0].published or ABSENT, highlight=rows[0].near_published)
+    if rows[0].quantity != NOT_IN_PAPER:
+        yield Cell(rows[0].published or ABSENT, highlight=rows[0].near_published)
 
 
 def _facts(rows: Sequence[Measured]) -> Iterator[str]:

@@ -2,14 +2,14 @@
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from bench.core import outcome
 from bench.core.errors import InputError, suggestion
-from bench.papers.computed import Computed, Score, extended, label
+from bench.papers.computed import Computed, Score, extended
 from bench.papers.item import Comparison, MeasuredItem
 from bench.papers.published import FACTS, SCENE, Sources, methods_of, read_published
 from bench.suite.experiment import Suite
@@ -24,6 +24,7 @@ ROUNDING = 1e-9  # 4.4 - 3.9 is not above 0.5
 NOT_ON_DISK = "not on disk"
 NO_TRUTH = "no ground truth"
 PUBLISHED_ONLY = "published only"
+NOT_IN_PAPER = "not in the paper"  # the column of what the paper does not have
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class SceneTable(MeasuredItem):
         reference column's first is the reference among what is measured.
     scenes
         The paper's name of each scene, and ours.
+    further
+        Selections that the paper does not have, each a column of its own after the published ones.
     variants
         For each published column further selections that could stand for it; `bench.papers.explain` tries them.
     """
@@ -57,12 +60,21 @@ class SceneTable(MeasuredItem):
     highlight_deg: float
     measured: Mapping[str, tuple[str, ...]]
     scenes: Mapping[str, str]
+    further: tuple[str, ...] = ()
     variants: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def suites(self, name: str) -> tuple[Suite, ...]:
         """What has to run."""
         datasets = (extended(self.dataset, {self.scene_parameter: scene}) for scene in self.scenes.values())
-        return (self.suite(name, datasets, dict.fromkeys(itertools.chain(*self.measured.values()))),)
+        return (self.suite(name, datasets, dict.fromkeys([*itertools.chain(*self.measured.values()), *self.further])),)
+
+    def with_methods(self, methods: Sequence[str]) -> "SceneTable":
+        """The table with a column for each of these; those that it has already keep their place."""
+        return replace(self, further=tuple(dict.fromkeys((*self.further, *methods))))
+
+    def verify(self, sources: Sources) -> None:
+        """Check that the layout and the published file fit together; raises as `check`."""
+        self.check(read_published(sources.published, self.published))
 
     def compare(self, sources: Sources, computed: Computed) -> "Scenes":
         """Measured, published and difference of each cell.
@@ -98,11 +110,12 @@ class SceneTable(MeasuredItem):
             measured = float(getattr(found[0], fact)) if found else np.nan
             yield Measured(scene, instance, fact, "", measured, printed[fact], outcome.OK if found else NOT_ON_DISK)
         first = next(iter(self.measured[self.highlight_reference]), "")
-        reference, reference_printed = self._score(found, first)[0], number(printed[self.highlight_reference])
+        reference = self._score(found, computed.spelled(first) if first else "")[0]
+        reference_printed = number(printed[self.highlight_reference])
         for column in columns:
             other = column != self.highlight_reference
             for method in self.measured[column] or ("",):
-                measured, status = self._score(found, method)
+                measured, status = self._score(found, computed.spelled(method) if method else "")
                 yield Measured(
                     scene,
                     instance,
@@ -115,13 +128,19 @@ class SceneTable(MeasuredItem):
                     other and self._near(number(printed[column]), reference_printed),
                 )
 
+        for text in self.further:
+            method = computed.spelled(text)
+            measured, status = self._score(found, method)
+            near = self._near(measured, reference)
+            yield Measured(scene, instance, NOT_IN_PAPER, method, measured, "", status, near)
+
     def _score(self, found: Sequence[Score], method: str) -> tuple[float, str]:
         """Mean over the seeds that ended well, and a status."""
         if not method:
             return np.nan, PUBLISHED_ONLY
         if not found:
             return np.nan, NOT_ON_DISK
-        own = [score for score in found if score.method == label("method", method)]
+        own = [score for score in found if score.method == method]
         well = [float(getattr(score, self.statistic)) for score in own if score.ok]
         if not well:
             return np.nan, "; ".join(dict.fromkeys(score.status for score in own)) or outcome.NOT_RUN

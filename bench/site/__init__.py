@@ -1,0 +1,1 @@
+"""Pages of results that are kept: runs and committed tables in, a folder of static pages out."""
