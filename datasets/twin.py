@@ -15,7 +15,7 @@ from ._simulated.statistics import statistics
 NOTE = "simulated measurements: a twin of {of}, whose topology is real; do not compare with published tables"
 
 
-@dataset("twin", title="Statistical twins")
+@dataset("twin", title="Statistical twins", cite="rotsync-bench")
 @dataclass(frozen=True)
 class Twin:
     """The topology of a measured graph, with measurements simulated by a law that was fitted to it without its truth.
