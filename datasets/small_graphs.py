@@ -137,14 +137,18 @@ def _made(name: str, recipe: Recipe, seed: int, identity: str) -> Instance:
 
 
 def _folded(truth: Floats, edges: Ints, measured: Floats, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Turn a third of the edges to the last third of the cameras by one rotation of the world; which those are (m,)."""
+    """Turn a third of the edges to the last third of the cameras by one rotation of the world; which those are (m,).
+
+    They keep their noise.
+    """
     part = np.arange(len(truth)) >= 2 * len(truth) // 3
     across = np.flatnonzero(part[edges[:, 0]] != part[edges[:, 1]])
     wrong = rng.choice(across, len(across) // 3, replace=False)
     turned = truth.copy()
     turned[part] = truth[part] @ so3.exp(np.radians(40.0) * so3.random_axes(rng, 1)[0])
     i, j = edges[wrong].T
-    measured[wrong] = turned[i] @ np.swapaxes(turned[j], -1, -2)
+    noise = truth[j] @ np.swapaxes(truth[i], -1, -2) @ measured[wrong]
+    measured[wrong] = turned[i] @ np.swapaxes(turned[j], -1, -2) @ noise
     mask = np.zeros(len(edges), dtype=bool)
     mask[wrong] = True
     return mask

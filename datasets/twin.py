@@ -42,15 +42,18 @@ class Twin:
     fold: bool = False
 
     def sources(self, data_dir: Path | None, seed: int) -> Iterator[Source | Missing]:
-        """A twin of each graph, by its name.
+        """A twin of each graph, by its name; what to name, where `of` names none.
 
         Raises
         ------
         InputError
-            Where `of` names no graph, or one that cannot be read.
+            Where `of` names what there is not, or cannot be read.
         """
         if not self.of:
-            raise InputError("twin needs a graph: twin[of='1dsfm[scene=Ellis_Island]'], or twin[of=graph.g2o]")
+            yield Missing(
+                "any graph", "name it: -d \"twin[of='1dsfm[scene=Ellis_Island]']\", or -d 'twin[of=graph.g2o]'"
+            )
+            return
         datasets = catalog("dataset")
         for info, parameters in datasets.select([datasets.with_paths(self.of)]):
             if info.cls is type(self):

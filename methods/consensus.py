@@ -6,6 +6,7 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, method, parameter, so3
 
+from ._lib.consensus.efficiency import widened
 from ._lib.consensus.evidence import noise_scale, support_by_triangles
 from ._lib.consensus.growth import grown
 from ._lib.consensus.half_edges import HalfEdges
@@ -26,7 +27,7 @@ START_DEG, START = (
 )  # where the scales of the cameras begin to fall; the larger of these degrees and noise scales
 STEPS = 12  # of least squares, for each solution that was grown and for the final one
 TOGETHER_DEG = 2.0  # where the scales of the final one begin
-JUDGED, APART = 0.25, 4.0  # noise scales at which solutions are compared, and by which they stand elsewhere
+JUDGED, APART = 0.5, 4.0  # noise scales at which solutions are compared, and by which they stand elsewhere
 
 
 @method(
@@ -48,10 +49,12 @@ class Consensus(Warm):
     3. Each is settled by reweighted least squares over all edges. The weight is that of the Geman-McClure loss, with
        a scale s_i for each camera, the smallest at which `agreeing` of its edges agree; the scales fall towards these
        from wide ones. An edge counts with s_ij^-2, the larger of its cameras' scales; see `settling`.
-    4. The best solution is the one with the largest sum over the cameras of log(0.2 + number of edges that agree at a
-       quarter of the noise scale). The others differ from it piece by piece, and each piece of another solution that
+    4. The best solution is the one with the largest sum over the cameras of log(0.2 + number of edges that agree at
+       half the noise scale). The others differ from it piece by piece, and each piece of another solution that
        raises the sum is taken over: single cameras, and folded parts as a whole; see `recombination`.
-    5. The result is settled again. `camera_sigma` tells how far each camera may be off; see `uncertainty`.
+    5. The result is settled again, with two, four or eight times wider losses where that makes cameras more precise:
+       for errors that are nearly normal, as between poses; see `efficiency`. `camera_sigma` tells how far each camera
+       may be off; see `uncertainty`.
 
     Weights and precisions multiply the weights of the edges, and so does what gravity says of them; see `prior`.
 
@@ -65,7 +68,7 @@ class Consensus(Warm):
     Parameters
     ----------
     agreeing
-        Edges that must agree with a camera; of fewer than five times as many, a fifth, and at least two.
+        Edges that must agree with a camera; where it has few, 30 % of them, and at least two.
     """
 
     agreeing: int = parameter(5, at_least=1)
@@ -82,18 +85,17 @@ class Consensus(Warm):
             cameras, taken = recombined(judge, cameras, other.cameras, APART * noise)
             pieces += taken
         final = Descent(problem, so3.from_quaternion(cameras), 0.0)
-        scales = settling.settle(final, np.radians(TOGETHER_DEG), STEPS)
-        taken_over = (
-            f"{pieces} pieces of other solutions taken over" if pieces else "no piece of another solution was better"
-        )
+        narrow = settling.settle(final, np.radians(TOGETHER_DEG), STEPS)
+        scales, errors = widened(problem, settling, final, narrow)
+        taken_over = f"; {pieces} pieces of others taken over" if pieces else ""
         return Estimate(
             so3.from_quaternion(final.cameras),
             edge_weights=settling.weights(final.angles, scales),
-            camera_sigma=camera_sigma(problem, final.vectors, final.angles, scales),
+            camera_sigma=camera_sigma(problem, final.vectors, final.angles, narrow, errors),
             iterations=final.iterations,
             stop_reason="all steps done",
             cost=-judge.of_angles(final.angles),
-            notes=(f"best of {len(settled)} solutions; {taken_over}",),
+            notes=(f"best of {len(settled)} solutions{taken_over}",),
         )
 
 

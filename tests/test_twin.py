@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from graphs import grid_edges
 from scenes import load, the_source, write_scene
 
 from bench.core.errors import InputError
@@ -15,7 +16,6 @@ from bench.datasets._simulated.sizes import Sizes
 from bench.datasets._simulated.streets import Street
 from bench.datasets.twin import Twin
 from bench.plugins.declare import Missing
-from tests.graphs import grid_edges
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -92,7 +92,7 @@ def test_what_is_not_on_disk_is_missing_with_the_command_that_gets_it(tmp_path: 
 
 @pytest.mark.parametrize(
     ("of", "message"),
-    [("", "twin needs a graph"), ("twin", "a twin of a twin"), ("nothing", "there is no dataset 'nothing'")],
+    [("twin", "a twin of a twin"), ("nothing", "there is no dataset 'nothing'")],
 )
 def test_a_twin_of_nothing_is_refused(of: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
@@ -111,3 +111,9 @@ def test_a_twin_of_ellis_island_has_the_errors_of_ellis_island(real_data: Path) 
         name = (ERROR, f"{level} %")
         ratio = np.median([twin[name] for twin in twins]) / real[name]
         assert 1 / 1.6 < ratio < 1.6
+
+
+def test_a_twin_of_nothing_says_what_to_name() -> None:
+    (missing,) = Twin().sources(None, 0)
+    assert isinstance(missing, Missing)
+    assert "twin[of=" in missing.how("twin")

@@ -3,7 +3,7 @@
 import sys
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bench.running.engines.local import Finished
@@ -21,7 +21,7 @@ def in_notebook() -> bool:
 
 def watched(planned: "Run") -> Iterator["Finished"]:
     """Run what is to do; yield each job as it ends, and show the board below the cell meanwhile."""
-    from IPython.display import display
+    from IPython import display as shown_by_jupyter
 
     from bench.running.progress.board import Board
     from bench.running.progress.live import workers_of
@@ -31,6 +31,7 @@ def watched(planned: "Run") -> Iterator["Finished"]:
     in_order = planned.options.engine == "local" and not planned.options.timing
     jobs = [cell.job for cell in planned.todo]
     board = Board(jobs, past.task, past.pace, workers_of(planned), in_order=in_order)
+    display: Any = shown_by_jupyter.display  # its types are only there where IPython is
     shown = display(_Text(board), display_id=True)
     drawn = time.monotonic()
     for finished in planned.execute():

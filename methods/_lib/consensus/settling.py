@@ -13,7 +13,7 @@ from .half_edges import HalfEdges
 
 NARROWEST, WIDEST = np.radians([0.02, 60.0])
 HALVINGS = 10  # of the interval in which a scale is sought, on a logarithmic axis: to one percent
-SHARE = 0.2  # of the edges at a camera; more need not agree
+SHARE = 0.3  # of the edges at a camera; more need not agree
 FEWEST, MOST = 2.0, 0.6  # but two must, or 60 % of fewer than four edges
 
 
@@ -26,7 +26,8 @@ class Settling:
     """
 
     def __init__(self, problem: Problem, half: HalfEdges, prior: Floats, agreeing: int) -> None:
-        self._edges, self._half, self._prior = problem.edges, half, prior
+        self.prior = prior
+        self._edges, self._half = problem.edges, half
         fewest = np.minimum(FEWEST, MOST * problem.degree)
         self._needed = np.maximum(np.minimum(agreeing, SHARE * problem.degree), fewest)
 
@@ -39,7 +40,7 @@ class Settling:
     def weights(self, angles: Floats, scales: Floats) -> Floats:
         """(m,) weights for residuals (m,) and scales (n,) of the cameras."""
         wider = wider_scales(self._edges, scales)
-        return self._prior / (wider * (1 + (angles / wider) ** 2)) ** 2
+        return self.prior / (wider * (1 + (angles / wider) ** 2)) ** 2
 
     def settle(self, descent: Descent, start: float, steps: int) -> Floats:
         """Move the cameras, in `steps`, with scales that fall from `start` to those of the cameras; the scales (n,)."""

@@ -60,6 +60,11 @@ class Descent:
         self._measure()
         return length
 
+    def move_to(self, cameras: Floats) -> None:
+        """Put the cameras elsewhere, at quaternions (n, 4)."""
+        self.cameras[:] = cameras
+        self._measure()
+
     def _measure(self) -> None:
         edge_kernels.edge_residuals(self._edges, self._measured, self.cameras, self.vectors, self.angles)
 
