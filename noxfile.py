@@ -8,7 +8,7 @@ nox.options.sessions = ["tests", "lint", "types"]
 @nox.session
 def tests(session: nox.Session) -> None:
     """Run the test suite on both cores; arguments go to pytest."""
-    session.install("-e", ".[colmap,test]")
+    session.install("-e", ".[colmap,theia,test]")
     session.run("python", "-m", "pytest", "-n", "auto", *session.posargs)
 
 

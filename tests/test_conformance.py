@@ -48,6 +48,7 @@ CONFIGURATIONS = [
     "maks[update=published]",
     "staircase[init=[spectral,spanning-tree,random]]",
     "colmap",
+    "theia[init=[spanning-tree,spectral,random]]",
     "dmf-synch[depth=[2,3,5]]",
     "dmf-synch[loss=[l1,l2]]",
     "dmf-synch[init=[cemp-mst,random]]",

@@ -49,6 +49,32 @@ def test_triangles_vouch_for_edges_by_how_well_they_close() -> None:
     np.testing.assert_allclose(support_by_triangles(HalfEdges.of(problem), problem.m, scales), wanted, atol=1e-9)
 
 
+def test_a_budget_leaves_each_edge_its_triangles_with_the_cameras_of_highest_rank(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On a complete graph, where all triangles close, each edge has as many as there are, or as are allowed."""
+    problem, _ = simulated(random_edges(30, 1.0))
+    half = HalfEdges.of(problem)
+    np.testing.assert_allclose(support_by_triangles(half, problem.m, np.ones(1)), 28, rtol=1e-9)
+    monkeypatch.setattr("bench.methods._lib.consensus.evidence.BUDGET", 20 * problem.m)
+    np.testing.assert_allclose(support_by_triangles(half, problem.m, np.ones(1)), 20, rtol=1e-9)
+
+
+def test_the_strongest_edges_are_those_of_either_end() -> None:
+    """Of equal weights those to cameras of higher rank."""
+    problem, _ = simulated(random_edges(20, 0.8))
+    half, most = HalfEdges.of(problem), 4
+    for weights in (np.random.default_rng(0).random(problem.m), np.arange(problem.m) % 3.0, np.ones(problem.m)):
+        wanted = set()
+        for first, last in itertools.pairwise(half.first.tolist()):
+            wanted |= set(sorted(half.ids[first:last].tolist(), key=lambda edge: -weights[edge])[:most])
+        found = half.strongest(weights, most)
+        assert set(found.ids.tolist()) == wanted
+        assert len(found.ids) == 2 * len(wanted)
+        degree = np.bincount(problem.edges[sorted(wanted)].ravel(), minlength=problem.n)
+        np.testing.assert_array_equal(np.diff(found.first), degree)
+
+
 def test_the_noise_scale_is_that_of_good_triangles() -> None:
     edges = random_edges(60, 0.5)
     scales = {}

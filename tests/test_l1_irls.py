@@ -91,6 +91,21 @@ def test_laplacian_solutions_are_least_squares(edges: Ints) -> None:
         np.testing.assert_allclose(x, wanted, atol=1e-9)
 
 
+def test_along_sequences_factors_are_dense_in_a_band_and_say_the_same() -> None:
+    """With parallel edges, and in whatever order the cameras are numbered."""
+    problem, _ = simulated(np.concatenate([GRID, GRID[::7]]))
+    problem, _ = transformed(problem)
+    rng = np.random.default_rng(1)
+    weights, right = rng.uniform(0.1, 2, problem.m), rng.standard_normal((problem.n - 1, 3))
+    degrees = np.bincount(problem.edges.ravel(), np.repeat(weights, 2))
+    banded, sparse = laplacian._factored(problem), laplacian._SparseSystem(problem)
+    assert isinstance(banded, laplacian._BandedSystem)
+    assert isinstance(laplacian._factored(simulated(SPARSE)[0]), laplacian._SparseSystem)
+    np.testing.assert_allclose(
+        banded.solve(weights, degrees, right), sparse.solve(weights, degrees, right), rtol=1e-9, atol=1e-9
+    )
+
+
 def test_large_graphs_are_solved_by_conjugate_gradients_to_the_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(laplacian, "LARGE", 200)
     problem, _ = simulated(random_edges(250, 0.2))

@@ -26,7 +26,7 @@ OUT_OF_RANGE = {
         "robust-lm[iterations=-1]", "sdp[eps=0]", "sdp[max_iterations=0]", "shonan[sigma_deg=0]", "shonan[p_max=2]",
         "shonan[tolerance=0]", "staircase[p_max=2]", "staircase[tolerance=-1]", "staircase[max_iterations=0]",
         "tg-mcmc[noise_deg=-1]", "tg-mcmc[step=1]", "tg-mcmc[keep=1]", "tg-mcmc[cooling=-1]", "tg-mcmc[iterations=0]",
-        "tg-mcmc[tolerance_deg=0]", "weiszfeld[sweeps=-1]", "weiszfeld[tolerance_deg=0]",
+        "tg-mcmc[tolerance_deg=0]", "theia[sigma_deg=0]", "weiszfeld[sweeps=-1]", "weiszfeld[tolerance_deg=0]",
     ],
     "dataset": [
         "erdos-renyi[n=1]", "erdos-renyi[n=30001]", "erdos-renyi[missing=1]", "erdos-renyi[missing=-0.1]",

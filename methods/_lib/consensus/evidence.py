@@ -23,7 +23,7 @@ def noise_scale(half: HalfEdges, m: int) -> float:
     the graph has no triangle.
     """
     histogram = np.zeros(BINS, dtype=np.int32)
-    _visit(half.first, half.others, half.ids, half.quaternions, SAMPLE, np.zeros(0), np.zeros((0, m)), histogram)
+    _visit(half, SAMPLE, np.zeros(0), np.zeros((m, 0)), histogram)
     if not histogram.any():
         return float(UNKNOWN)
     cumulated = np.cumsum(histogram)
@@ -42,31 +42,43 @@ def support_by_triangles(half: HalfEdges, m: int, scales: Floats) -> Floats:
     scales
         (k,) values of s, radians.
     """
-    support, histogram = np.zeros((len(scales), m)), np.zeros(BINS, dtype=np.int32)
-    most = max(FEWEST, BUDGET // m)
-    _visit(half.first, half.others, half.ids, half.quaternions, most, scales, support, histogram)
-    return support
+    support = np.zeros((m, len(scales)))
+    _visit(half, max(FEWEST, BUDGET // m), scales, support, np.zeros(BINS, dtype=np.int32))
+    return np.ascontiguousarray(support.T)
+
+
+def _visit(half: HalfEdges, most: int, scales: Floats, support: Floats, histogram: Ints) -> None:
+    """Visit up to `most` triangles over each edge; see `_visit_triangles`."""
+    whole = most >= np.diff(half.first).max()
+    _visit_triangles(
+        half.ranks, half.first, half.others, half.ids, half.quaternions, most, whole, scales, support, histogram
+    )
 
 
 @compiled
-def _visit(
+def _visit_triangles(
+    ranks: Ints,
     first: Ints,
     others: Ints,
     ids: Ints,
     quaternions: Floats,
     most: int,
+    whole: bool,
     scales: Floats,
     support: Floats,
     histogram: Ints,
 ) -> None:
-    """Visit up to `most` triangles over each edge.
+    """Visit up to `most` triangles over each edge; where these are all, every triangle once.
 
     Parameters
     ----------
-    first, others, ids, quaternions
+    ranks, first, others, ids, quaternions
         See `HalfEdges`.
+    whole
+        Whether every edge has at most so many: a triangle then counts for its three edges when that between the two
+        cameras of highest rank is visited, and otherwise for the visited edge alone.
     scales, support
-        (k,) and (k, m): what triangles that close at each scale add to.
+        (k,) and (m, k): what triangles that close at each scale add to.
     histogram
         (b,) what their angles add to, bins of equal width up to pi.
     """
@@ -81,8 +93,11 @@ def _visit(
             if longer > 0 or (longer == 0 and j > i):
                 continue
             w, x, y, z = quaternions[a, 0], quaternions[a, 1], quaternions[a, 2], quaternions[a, 3]
-            count = 0
-            for b in range(first[j], first[j + 1]):
+            last, count = max(ranks[i], ranks[j]), 0
+            for step in range(first[j + 1] - first[j]):
+                b = first[j + 1] - 1 - step if whole else first[j] + step
+                if whole and ranks[others[b]] < last:
+                    break
                 c = place[others[b]]
                 if c < 0:
                     continue
@@ -98,9 +113,12 @@ def _visit(
                 histogram[min(int(angle / math.pi * bins), bins - 1)] += 1
                 for k in range(len(scales)):
                     share = 1 / (1 + (angle / scales[k]) ** 2)
-                    support[k, ids[a]] += share * share
+                    support[ids[a], k] += share * share
+                    if whole:
+                        support[ids[b], k] += share * share
+                        support[ids[c], k] += share * share
                 count += 1
-                if count == most:
+                if count == most and not whole:
                     break
         for a in range(first[i], first[i + 1]):
             place[others[a]] = -1

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench import Floats, Ints, Problem, so3
 
@@ -53,14 +54,37 @@ class HalfEdges:
         degree = np.diff(self.first)
         if degree.max() <= most:
             return self
-        ends = np.repeat(np.arange(len(degree)), degree)
-        order = np.lexsort((-weights[self.ids], ends))
-        place = np.arange(len(order)) - np.repeat(self.first[:-1], degree)
         among = np.zeros(len(weights), dtype=np.bool_)
-        among[self.ids[order[place < most]]] = True
+        _mark_strongest(self.first, self.ids, weights, most, among)
         kept = among[self.ids]
-        first = np.concatenate([[0], np.cumsum(np.bincount(ends[kept], minlength=len(degree)))]).astype(np.int32)
+        first = np.concatenate([[0], np.cumsum(kept)])[self.first].astype(np.int32)
         return HalfEdges(self.ranks, first, self.others[kept], self.ids[kept], self.quaternions[kept])
+
+
+@edge_kernels.compiled
+def _mark_strongest(first: Ints, ids: Ints, weights: Floats, most: int, among: NDArray[np.bool_]) -> None:
+    """Mark in `among` (m,) the `most` edges of largest `weights` (m,) at each camera, of equals those that come first.
+
+    Parameters
+    ----------
+    first, ids
+        See `HalfEdges`.
+    """
+    for i in range(len(first) - 1):
+        own = ids[first[i] : first[i + 1]]
+        if len(own) <= most:
+            among[own] = True
+            continue
+        least = np.partition(weights[own], len(own) - most)[len(own) - most]
+        equal = most
+        for edge in own:
+            if weights[edge] > least:
+                among[edge] = True
+                equal -= 1
+        for edge in own:
+            if weights[edge] == least and equal > 0:
+                among[edge] = True
+                equal -= 1
 
 
 def _ranks(problem: Problem) -> Ints:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bench import Floats
+from bench import Floats, Ints
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -167,15 +167,25 @@ def narrow(graph: "sparse.csr_array", share: float = NARROW) -> bool:
 
     By the largest distance from the diagonal in the reverse Cuthill-McKee numbering, below `share` of n.
     """
+    return within_band(graph, share * graph.shape[0]) is not None
+
+
+def within_band(graph: "sparse.csr_array", most: float) -> Ints | None:
+    """The reverse Cuthill-McKee numbering of a symmetric matrix (n, n): the camera (n,) at each place.
+
+    None where an entry is `most` places or more away from the diagonal.
+    """
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
     n = graph.shape[0]
     degrees = np.diff(graph.indptr)
-    if degrees.max() >= 2 * share * n:  # the bandwidth is at least half of it
-        return False
-    position = np.empty(n, dtype=np.intp)
-    position[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(n)
-    return bool(np.abs(position[np.repeat(np.arange(n), degrees)] - position[graph.indices]).max() < share * n)
+    if degrees.max() >= 2 * most:  # the bandwidth is at least half of it
+        return None
+    order = reverse_cuthill_mckee(graph, symmetric_mode=True)
+    position = np.empty(n, dtype=np.int32)
+    position[order] = np.arange(n, dtype=np.int32)
+    farthest = np.abs(position[np.repeat(np.arange(n), degrees)] - position[graph.indices]).max()
+    return order if farthest < most else None
 
 
 def sparse_factors(matrix: "sparse.csr_array") -> "Product | None":

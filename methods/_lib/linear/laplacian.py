@@ -9,7 +9,7 @@ from bench import Floats, Ints, Problem
 from ..graph.confidence import confidence, strengths
 from ..loops import edge_kernels
 from ..loops.edge_kernels import Singles
-from .eigen import narrow
+from .eigen import narrow, within_band
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -20,6 +20,7 @@ DENSE_SHARE = 0.1  # of all pairs that are edges; from here on dense factors are
 LARGE = 500  # cameras; from here on conjugate gradients are fastest where the graph is well connected
 WELL_CONNECTED = 20  # edges at a camera, on average
 SEQUENCE = 0.02  # bandwidth over cameras, below which factors are cheap and conjugate gradients slow
+BAND = 12  # bandwidth over edges at a camera, below which factors that are dense in the band are fastest
 SMALLEST = np.finfo(np.float32).tiny  # in place of zero, under a fraction
 MOST_PRODUCTS = 500  # of conjugate gradients in one system, before it is factored instead
 
@@ -50,8 +51,9 @@ class LaplacianSolver:
 
     The normal matrix is the weighted graph Laplacian, the same for the three columns: it is factored once for
     each set of weights. The last camera is anchored, and the mean of x is zero. Factors are dense (LAPACK
-    ``posv``) or sparse (SuperLU without pivoting, the matrix being positive definite; the ordering that
-    reduces fill is found once), whichever was measured to be faster at this size and density.
+    ``posv``), dense within a band (``pbtrf``, along sequences) or sparse (SuperLU without pivoting, the matrix being
+    positive definite; the ordering that reduces fill is found once), whichever was measured to be fastest at this
+    size, density and bandwidth.
 
     Where an approximation will do, large graphs with many edges at a camera are not factored, except long sequences:
     conjugate gradients, preconditioned by the diagonal, single precision. A system that takes them too long is
@@ -127,11 +129,14 @@ def compile_and_load() -> None:
     problem = Problem(2, np.array([[0, 1]], dtype=np.int32), np.eye(3)[None])
     one, zeros = np.ones(2), np.zeros((2, 3))
     _conjugate_gradients(problem.edges, one[:1], one, zeros, 1.0, zeros)
+    _BandedSystem(problem, np.arange(2, dtype=np.int32)).solve(one[:1], one, zeros[:1])
 
 
-def _factored(problem: Problem) -> "_DenseSystem | _SparseSystem":
-    dense = problem.n <= SMALL or 2 * problem.m > DENSE_SHARE * problem.n**2
-    return _DenseSystem(problem) if dense else _SparseSystem(problem)
+def _factored(problem: Problem) -> "_DenseSystem | _BandedSystem | _SparseSystem":
+    if problem.n <= SMALL or 2 * problem.m > DENSE_SHARE * problem.n**2:
+        return _DenseSystem(problem)
+    order = within_band(problem.adjacency(), BAND * 2 * problem.m / problem.n)
+    return _SparseSystem(problem) if order is None else _BandedSystem(problem, order)
 
 
 class _DenseSystem:
@@ -149,6 +154,31 @@ class _DenseSystem:
         if info != 0:
             raise np.linalg.LinAlgError(f"the Laplacian is not positive definite (row {info})")
         return np.asarray(x)
+
+
+class _BandedSystem:
+    """As `_DenseSystem`, for cameras in an `order` (n,) in which those of an edge stand close together."""
+
+    def __init__(self, problem: Problem, order: Ints) -> None:
+        size = problem.n - 1
+        self._order = order[order != size]
+        position = np.full(problem.n, -1, dtype=np.int32)  # the last camera is anchored
+        position[self._order] = np.arange(size, dtype=np.int32)
+        self._places = position[problem.edges]
+        inside = self._places.min(axis=1) >= 0
+        self._width = 1 + int(np.ptp(self._places[inside], axis=1).max(initial=0))
+
+    def solve(self, weights: Floats, degrees: Floats, right: Floats) -> Floats:
+        from scipy.linalg import lapack
+
+        rows = np.zeros((len(self._order), self._width))
+        edge_kernels.banded_laplacian(self._places, weights, degrees[self._order], rows)
+        factor, info = lapack.dpbtrf(rows.T, lower=1, overwrite_ab=1)
+        if info != 0:
+            raise np.linalg.LinAlgError(f"the Laplacian is not positive definite (row {info})")
+        x = np.empty_like(right)
+        x[self._order] = lapack.dpbtrs(factor, right[self._order], lower=1)[0]
+        return x
 
 
 class _SparseSystem:

@@ -194,6 +194,27 @@ def laplacian_product(edges: Ints, weights: Singles, degrees: Singles, x: Single
 
 
 @compiled
+def banded_laplacian(places: Ints, weights: Floats, degrees: Floats, rows: Floats) -> None:
+    """Add a weighted graph Laplacian to the rows of its lower band, for LAPACK: entry (i, j) at ``rows[j, i - j]``.
+
+    Parameters
+    ----------
+    places, weights
+        (m, 2) and (m,): the row of each end of an edge, -1 for a camera that has none.
+    degrees
+        (k,): the sums of the weights at each camera.
+    rows
+        (k, b), zeros.
+    """
+    for i in range(len(degrees)):
+        rows[i, 0] = degrees[i]
+    for e in range(len(places)):
+        low, high = min(places[e, 0], places[e, 1]), max(places[e, 0], places[e, 1])
+        if low >= 0:
+            rows[low, high - low] -= weights[e]
+
+
+@compiled
 def dense_laplacian(edges: Ints, weights: Floats, degrees: Floats, matrix: Floats) -> None:
     """Fill the upper triangle of a weighted graph Laplacian without its last row and column.
 
