@@ -79,7 +79,7 @@ def test_evidence_is_of_the_kind_where_there_is_enough_and_ranks_decide() -> Non
     assert set(zip(rows["method"], rows["params"], strict=True)) == candidates
     contested = of_other_graphs(rows, CONTESTED, candidates)
     assert contested.of_kind
-    assert contested.graphs >= 10
+    assert contested.graphs >= 20
     assert not of_other_graphs(rows, UNCHECKED, candidates).of_kind
     able = candidates - {contested.choice.recommended.method}
     assert of_other_graphs(rows, CONTESTED, able).choice.recommended.method in able

@@ -59,14 +59,14 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Choice:
-    """Candidates, the smallest median error first, and which of them is recommended."""
+    """Candidates, the best first, and which of them is recommended."""
 
     candidates: tuple[Candidate, ...]
     recommended: Candidate
 
     @property
     def best(self) -> Candidate:
-        """The one that has the smallest error, told apart or not."""
+        """The first, told apart from others or not."""
         return next(one for one in self.candidates if one.tied)
 
     @property
@@ -80,7 +80,7 @@ class Choice:
         return next((one for one in self.candidates if not one.tied), None)
 
 
-def choose(frame: "pd.DataFrame", tied: Collection[Configured], order: Sequence[Configured] = ()) -> Choice:
+def choose(frame: "pd.DataFrame", tied: Collection[Configured]) -> Choice:
     """The quickest of the methods that are tied with the best and have errors within `MARGIN` of its own.
 
     A tie among a few graphs is wide, and what cannot be told apart may still be expected to be worse: it is told as a
@@ -92,12 +92,8 @@ def choose(frame: "pd.DataFrame", tied: Collection[Configured], order: Sequence[
         Scored rows, see `bench.scoring.results.Results.frame`.
     tied
         Which cannot be told apart from the best.
-    order
-        From the best on, where that is not the order of median errors.
     """
-    found = [_candidate(method, rows, tied) for method, rows in _of_methods(frame).items()]
-    place = {method: k for k, method in enumerate(order)}
-    found.sort(key=lambda one: (place.get(one.method, len(place)), one.median.middle))
+    found = sorted(_candidates(frame, tied), key=lambda one: one.median.middle)
     equal = [one for one in found if one.tied]
     best = equal[0]
     near = [
@@ -106,6 +102,25 @@ def choose(frame: "pd.DataFrame", tied: Collection[Configured], order: Sequence[
         if one.median.middle <= MARGIN * best.median.middle and one.mean.middle <= MARGIN * best.mean.middle
     ]
     return Choice(tuple(found), min(near, key=lambda one: one.seconds.middle))
+
+
+def first(frame: "pd.DataFrame", tied: Collection[Configured], order: Sequence[Configured]) -> Choice:
+    """The first in an order, however quick: on graphs that are unlike each other, equal middles are no equal errors.
+
+    Parameters
+    ----------
+    frame, tied
+        As of `choose`.
+    order
+        From the best on.
+    """
+    by_method = {one.method: one for one in _candidates(frame, tied)}
+    found = tuple(by_method[method] for method in order)
+    return Choice(found, found[0])
+
+
+def _candidates(frame: "pd.DataFrame", tied: Collection[Configured]) -> list[Candidate]:
+    return [_candidate(method, rows, tied) for method, rows in _of_methods(frame).items()]
 
 
 def _of_methods(frame: "pd.DataFrame") -> "Mapping[Configured, pd.DataFrame]":

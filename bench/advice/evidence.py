@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING
 
-from bench.advice.choice import Choice, choose
+from bench.advice.choice import Choice, first
 from bench.advice.look import Kind
 from bench.core.errors import InputError
+from bench.reporting.tables.collections import LEAST_FOR_TIES
 from bench.scoring.inference.blocks import Blocks, Configured, blocks
 from bench.scoring.inference.ranking import critical_difference
 
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PACKAGE, FOLDER, FILE = "bench.results.reference", "recommend", "errors.csv"
-FEWEST = 10  # graphs of a kind; of fewer nothing can be told, and those of all kinds are taken
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ _TEXTS = {"instance": str, "params": str}
 
 
 def of_other_graphs(rows: "pd.DataFrame", kind: Kind, methods: Collection[Configured]) -> Evidence:
-    """What other graphs say whose twins are not to be trusted either, those of one kind where there are enough.
+    """What other graphs say whose twins are not to be trusted either: of one kind where there are `LEAST_FOR_TIES`.
 
     Parameters
     ----------
@@ -84,11 +84,11 @@ def of_other_graphs(rows: "pd.DataFrame", kind: Kind, methods: Collection[Config
     if rows.empty:
         raise InputError("nothing is known of how the candidates do on graphs whose twins are not to be trusted")
     of_kind = rows[rows["kind"] == kind]
-    enough = of_kind["instance"].nunique() >= FEWEST
+    enough = of_kind["instance"].nunique() >= LEAST_FOR_TIES
     rows = of_kind if enough else rows
     order, tied = _ranked(blocks(rows))
     return Evidence(
-        choose(rows, tied, order),
+        first(rows, tied, order),
         int(rows["instance"].nunique()),
         tuple(rows["collection"].unique()),
         bool(enough),

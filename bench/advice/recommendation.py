@@ -106,6 +106,11 @@ def doubted(seen: Look, trial: Trial) -> list[str]:
             f"{seen.open:.0%} of the triangles are open: where that many are, wrong edges may agree with each other, "
             "as in scans of which all pairs are registered"
         )
+    if not seen.upright:
+        found.append(
+            "the law of their errors is that of photographs taken upright, which roll little, and here cameras roll to "
+            f"each other by {seen.roll:.2g} times as much as they pan, as scans do"
+        )
     if not trial.fits(seen):
         found.append(
             f"their triangles do not close like those of the graph, up to a factor of {trial.misfit(seen):.1f} "
