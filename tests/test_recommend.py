@@ -15,7 +15,8 @@ from bench.advice.evidence import kept, of_other_graphs
 from bench.advice.look import CONSISTENT, CONTESTED, UNCHECKED, look
 from bench.advice.recommendation import Recommendation
 from bench.advice.trial import load
-from bench.advice.words import answer
+from bench.advice.words import answer, twins_grid
+from bench.core import so3
 from bench.core.errors import InputError
 from bench.core.problem import Problem
 from bench.suite.experiment import load_suite
@@ -42,6 +43,14 @@ def test_triangles_tell_the_kind_of_a_graph() -> None:
     found = look(chain(40))
     assert found.kind == UNCHECKED
     assert (found.triangles, found.closures_deg, found.outside) == (0, (), 1)
+
+
+@pytest.mark.parametrize(("axis", "upright"), [(1, True), (2, False)])
+def test_cameras_that_roll_are_not_upright(axis: int, upright: bool) -> None:
+    edges = random_edges(10, 1.0)
+    vectors = np.full((len(edges), 3), 0.01)
+    vectors[:, axis] = 0.3
+    assert look(Problem(10, edges, so3.exp(vectors))).upright == upright
 
 
 def test_what_comes_with_the_measurements_is_named() -> None:
@@ -111,6 +120,7 @@ def test_a_graph_without_triangles_is_told_that_its_twins_are_not_to_be_trusted(
         answer(Recommendation(asked.instance, asked.look, asked.trial, asked.on_twins, evidence, asked.doubts))
     )
     assert "twins are not to be trusted" in told
+    assert "not to be trusted" in twins_grid(asked).caption
     assert "cannot be foretold" in told
     assert "Error to expect" not in told
 

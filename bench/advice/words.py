@@ -35,8 +35,9 @@ def seen_in(found: Look) -> Iterator[str]:
 
 def twins_grid(of: Recommendation) -> Grid:
     """What the candidates did on the twins, a line each."""
+    like = "not to be trusted, see below" if of.doubts else "errors like its own, exact truth"
     return Grid(
-        caption=f"{counted(of.trial.twins, 'simulated twin')}: same graph, errors like its own, exact truth",
+        caption=f"{counted(of.trial.twins, 'simulated twin')}: same graph, {like}",
         facts=("Method",),
         methods=tuple((head, "") for head in ("median °", "least to largest", "mean °", "least to largest", "time s")),
         rows=tuple(((one.name,), _cells(one)) for one in of.on_twins.candidates),
@@ -58,15 +59,12 @@ def answer(of: Recommendation) -> Iterator[str]:
     """The recommendation, what it rests on and what would change it, a paragraph each."""
     chosen = of.choice.recommended
     yield f"Recommended: {chosen.name}"
-    yield from map(_sentence, of.doubts)
+    if of.doubts:
+        yield f"The twins are not to be trusted here: {'; '.join(of.doubts)}."
     yield _by_evidence(of, of.evidence) if of.evidence else _by_twins(of)
     yield _ties(of)
     if changes := list(_changes(of)):
         yield "What would change the answer:\n" + "\n".join(f"- {line}" for line in changes)
-
-
-def _sentence(doubt: str) -> str:
-    return f"The twins are not to be trusted here: {doubt}."
 
 
 def _by_twins(of: Recommendation) -> str:
@@ -106,7 +104,7 @@ def _ties(of: Recommendation) -> str:
         told.append(f"Not told apart from the best {where} either: {', '.join(others)}.")
     if choice.behind:
         told.append(
-            f"Told apart from it: {choice.behind.name} and what follows, at {degrees(choice.behind.median.middle)}."
+            f"The others are told apart, {choice.behind.name} ({degrees(choice.behind.median.middle)} degrees) first."
         )
     return " ".join(told)
 
