@@ -1,6 +1,7 @@
 """The reference benchmark of rotation synchronization (multiple rotation averaging).
 
-What there is for users: `run`, `solve`, `score`, `compare`, `report`, `catalog`, `Problem`, `Estimate`, `Instance`.
+What there is for users: `run`, `solve`, `score`, `compare`, `recommend`, `report`, `catalog`, `Problem`, `Estimate`,
+`Instance`.
 What a plug-in needs besides: `method`, `dataset`, `parameter`, `Checkpoint`, `Skipped`, `Source`, `Missing`,
 `InputError`, `suggestion`, `so3`, `stream`, `sample_triangles`, `closures`, and the array types `Floats` and `Ints`.
 Each is imported when it is first used.
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bench.api import compare as compare
+    from bench.api import recommend as recommend
     from bench.api import report as report
     from bench.api import run as run
     from bench.api import score as score
@@ -40,7 +42,7 @@ __version__ = "0.2.0.dev0"
 
 # Where each name of the door lives.
 HOMES = {
-    **dict.fromkeys(("run", "solve", "score", "report", "compare"), "bench.api"),
+    **dict.fromkeys(("run", "solve", "score", "report", "compare", "recommend"), "bench.api"),
     **dict.fromkeys(
         ("Problem", "Estimate", "Instance", "Checkpoint", "Skipped", "Floats", "Ints"), "bench.core.problem"
     ),

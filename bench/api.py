@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
+    from bench.advice.recommendation import Recommendation
     from bench.core.problem import Estimate, Floats, Information, WeightsKind
 
     Edges = NDArray[np.integer[Any]] | Sequence[Sequence[int]]
@@ -259,3 +260,53 @@ def compare(
     if isinstance(methods, str):
         raise InputError(f"methods takes a list of selections, such as [{methods!r}], not {methods!r} alone")
     return contest(score(Store.open(Path(run)), align, protocol), methods, threshold).rows
+
+
+def recommend(
+    graph: str | Path,
+    methods: Sequence[str] = (),
+    *,
+    budget_s: float = 60.0,
+    out: str | Path | None = None,
+    data_dir: str | Path | None = None,
+    jobs: int | None = None,
+    plugins: Sequence[str | Path] = (),
+) -> "Recommendation":
+    """Recommend a method for a graph; the same as ``python -m bench recommend``, without its words.
+
+    Parameters
+    ----------
+    graph
+        A file or folder, or a selection of a dataset that stands for one graph.
+    methods
+        Selections of candidates in place of the suite's.
+    budget_s
+        Seconds for the candidates.
+    out
+        Folder in which the run on the twins is kept.
+    data_dir, jobs, plugins
+        As in `run`.
+
+    Returns
+    -------
+    Recommendation
+        Its `method` is the recommended one, as a selection; `choice` has every candidate with its errors, and `doubts`
+        say why its simulated twins are not to be trusted.
+
+    Raises
+    ------
+    InputError
+        On a graph that cannot be read, and where no candidate ends well.
+    """
+    from bench.advice.recommendation import recommend as recommended
+    from bench.running.run import Options
+
+    if isinstance(methods, str):
+        raise InputError(f"methods takes a list of selections, such as [{methods!r}], not {methods!r} alone")
+    options = Options(
+        out=None if out is None else Path(out),
+        data_dir=None if data_dir is None else Path(data_dir),
+        jobs=jobs,
+        plugins=tuple(map(Path, plugins)),
+    )
+    return recommended(str(graph), options, methods, budget_s)

@@ -24,7 +24,7 @@ ORDER = (
     ("running",),
     ("scoring",),
     ("reporting",),
-    ("papers", "maps", "site"),
+    ("papers", "maps", "site", "advice"),
     ("api",),
     ("cli",),
     ("__main__",),

@@ -25,6 +25,7 @@ from bench.cli import (
     new,
     paper,
     plot,
+    recommend,
     regression_pack,
     report,
     rerun,
@@ -85,7 +86,7 @@ VERBS = (
         new.new,
         check.check,
     ),
-    *(calibrate.calibrate, regression_pack.regression_pack),
+    *(calibrate.calibrate, regression_pack.regression_pack, recommend.recommend),
 )
 for verb in VERBS:
     app.command(verb.__name__.rstrip("_").replace("_", "-"))(verb)

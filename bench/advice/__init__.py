@@ -1,0 +1,1 @@
+"""Which method to use on a graph: what it looks like, how methods do on simulated twins of it, and earlier evidence."""
