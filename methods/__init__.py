@@ -3,4 +3,4 @@
 if __name__ != "bench.methods":
     raise ImportError("this folder is bench.methods: import it under that name, with the checkout's root on the path")
 
-DEFAULT = "l1-irls"  # what solves a graph where no method is named
+DEFAULT = "consensus"  # what solves a graph where no method is named

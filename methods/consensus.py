@@ -87,7 +87,7 @@ class Consensus(Warm):
         final = Descent(problem, so3.from_quaternion(cameras), 0.0)
         narrow = settling.settle(final, np.radians(TOGETHER_DEG), STEPS)
         scales, errors = widened(problem, settling, final, narrow)
-        taken_over = f"; {pieces} pieces of others taken over" if pieces else ""
+        taken_over = f"; {pieces} piece{'s' * (pieces > 1)} of others taken over" if pieces else ""
         return Estimate(
             so3.from_quaternion(final.cameras),
             edge_weights=settling.weights(final.angles, scales),

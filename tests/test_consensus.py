@@ -113,6 +113,13 @@ def test_only_the_strongest_edges_take_part() -> None:
         assert best <= set(half.ids[half.first[camera] : half.first[camera + 1]].tolist())
 
 
+def test_two_crowds_that_one_weak_edge_connects_stay_connected() -> None:
+    crowd = random_edges(45, 1.0)
+    edges = np.concatenate([crowd, crowd + 45, [[0, 89]]]).astype(np.int32)
+    problem, truth = simulated(edges, noise_deg=0.1)
+    assert errors_deg(solved(problem), truth).max() < 1
+
+
 def test_the_scale_of_a_camera_is_where_enough_of_its_edges_agree() -> None:
     problem, _ = simulated(random_edges(40, 0.9), outliers=0.3)
     settling = Settling(problem, HalfEdges.of(problem), np.ones(problem.m), 5)

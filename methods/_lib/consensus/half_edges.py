@@ -50,7 +50,10 @@ class HalfEdges:
         return cls(ranks, first, others[order].astype(np.int32), (order % m).astype(np.int32), both[order])
 
     def strongest(self, weights: Floats, most: int) -> "HalfEdges":
-        """Those of the edges that are among the `most` of largest `weights` (m,) at one of their ends at least."""
+        """Those of the edges that are among the `most` of largest `weights` (m,) at one of their ends at least.
+
+        All edges, where these alone do not connect the cameras.
+        """
         degree = np.diff(self.first)
         if degree.max() <= most:
             return self
@@ -58,7 +61,18 @@ class HalfEdges:
         _mark_strongest(self.first, self.ids, weights, most, among)
         kept = among[self.ids]
         first = np.concatenate([[0], np.cumsum(kept)])[self.first].astype(np.int32)
-        return HalfEdges(self.ranks, first, self.others[kept], self.ids[kept], self.quaternions[kept])
+        found = HalfEdges(self.ranks, first, self.others[kept], self.ids[kept], self.quaternions[kept])
+        return found if found.connected else self
+
+    @property
+    def connected(self) -> bool:
+        """Whether every camera can be reached from every other."""
+        from scipy import sparse
+        from scipy.sparse.csgraph import connected_components
+
+        n = len(self.first) - 1
+        graph = sparse.csr_array((np.ones(len(self.others), dtype=np.int8), self.others, self.first), shape=(n, n))
+        return bool(connected_components(graph, directed=False)[0] == 1)
 
 
 @edge_kernels.compiled
