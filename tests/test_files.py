@@ -124,8 +124,8 @@ def test_solve_says_what_nothing_checks_and_what_was_used(tmp_path: Path) -> Non
     used = command("solve", "mine.npz", "-m", "spanning-tree", "-o", "out.txt", cwd=tmp_path).stdout
     refused = command("solve", "mine.npz", "-m", "spanning-tree", "-o", "o.txt", "--use", "none", cwd=tmp_path).stdout
     assert "weights: used" in used
-    assert "l1-irls: " in done.stdout
-    assert "ended by: mean step below" in done.stdout
+    assert "consensus: " in done.stdout
+    assert "ended by: all steps done" in done.stdout
     assert "weights: not used by spanning-tree" in refused
 
 

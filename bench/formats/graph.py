@@ -122,7 +122,8 @@ def checked_rotations(matrices: Floats, where: Where) -> Floats:
     rotations = so3.project(matrices)
     distance = np.linalg.norm(matrices - rotations, axis=(1, 2))
     if (row := first(distance > PRECISION)) is not None:
-        determinant = float(np.linalg.det(matrices[row]))
+        with np.errstate(all="ignore"):  # entries so small that their quotients overflow
+            determinant = float(np.linalg.det(matrices[row]))
         what = (
             f"the matrix is a reflection: its determinant is {determinant:.3g} and must be +1"
             if determinant < 0
