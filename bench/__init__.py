@@ -3,7 +3,8 @@
 What there is for users: `run`, `solve`, `score`, `compare`, `recommend`, `report`, `catalog`, `Problem`, `Estimate`,
 `Instance`.
 What a plug-in needs besides: `method`, `dataset`, `parameter`, `Checkpoint`, `Skipped`, `Source`, `Missing`,
-`InputError`, `suggestion`, `so3`, `stream`, `sample_triangles`, `closures`, and the array types `Floats` and `Ints`.
+`InputError`, `suggestion`, `so3`, `stream`, `sample_triangles`, `closures`, for methods that learn `Learned` and
+`Trainer`, and the array types `Floats` and `Ints`.
 Each is imported when it is first used.
 """
 
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from bench.core.seeds import stream as stream
     from bench.core.triangles import closures as closures
     from bench.core.triangles import sample_triangles as sample_triangles
+    from bench.learning.learned import Learned as Learned
+    from bench.learning.learned import Trainer as Trainer
     from bench.plugins.catalog import catalog as catalog
     from bench.plugins.configure import parameter as parameter
     from bench.plugins.declare import Missing as Missing
@@ -47,6 +50,7 @@ HOMES = {
         ("Problem", "Estimate", "Instance", "Checkpoint", "Skipped", "Floats", "Ints"), "bench.core.problem"
     ),
     **dict.fromkeys(("method", "dataset", "Source", "Missing"), "bench.plugins.declare"),
+    **dict.fromkeys(("Learned", "Trainer"), "bench.learning.learned"),
     "catalog": "bench.plugins.catalog",
     "parameter": "bench.plugins.configure",
     **dict.fromkeys(("InputError", "suggestion"), "bench.core.errors"),

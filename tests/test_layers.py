@@ -18,6 +18,7 @@ ROOT = Path(__file__).parent.parent
 ORDER = (
     ("core",),
     ("plugins", "formats"),
+    ("learning",),
     ("suite",),
     ("storage",),
     ("execution",),

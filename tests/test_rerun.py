@@ -84,7 +84,7 @@ def test_the_limits_of_the_record_hold(faulty_plugin: Path, tmp_path: Path) -> N
 def test_a_changed_source_is_said(faulty_plugin: Path, tmp_path: Path) -> None:
     record = recorded(faulty_plugin, tmp_path / "run", "faulty")
     faulty_plugin.write_text(faulty_plugin.read_text() + "\n# edited\n")
-    assert prepare(record).differences == ("the source of faulty has changed",)
+    assert prepare(record).differences == ("the source or the weights of faulty have changed",)
 
 
 def test_a_plugin_that_has_moved_is_named(faulty_plugin: Path, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 
+from bench.core.digest import digest
 from bench.core.errors import InputError
 from bench.core.problem import Estimate, Floats, Information, Instance, Problem
 from bench.core.program import program
@@ -113,6 +114,11 @@ class Info:
         """Hash of the plug-in's file and of the sibling modules it imports."""
         module = sys.modules[self.cls.__module__]
         return hash_of_module(module)
+
+    def version_of(self, parameters: Mapping[str, Any]) -> str:
+        """Hash of what decides its answers besides its parameters: its source, and the weights it was trained to."""
+        weights = getattr(self.configure(parameters), "weights_hash", "")
+        return digest([self.source_hash, weights]) if weights else self.source_hash
 
     def fact(self, name: str, configured: Any) -> Any:
         """A fact of a configured object: its attribute of that name, or what the plug-in declares."""

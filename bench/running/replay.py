@@ -167,8 +167,8 @@ def _changes(record: Record, method: MethodInfo) -> list[str]:
     """What differs besides the data."""
     sentences = []
     job = record.job
-    if job.source_hash != method.source_hash:
-        sentences.append(f"the source of {job.method} has changed")
+    if job.source_hash != method.version_of(job.parameters):
+        sentences.append(f"the source or the weights of {job.method} have changed")
     here = provenance.of_this_run()
     then = dict(record.versions)
     now = dict(provenance.versions(method.requires_of(job.parameters)))

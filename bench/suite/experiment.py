@@ -188,7 +188,7 @@ def _cells_of(
         configured_method = info.configure(parameters)
         repeated = not source.seeded and info.varies(configured_method)
         refused = [] if use is None else sorted(set(info.fact("uses", configured_method)) - set(use))
-        complete, source_hash = parameters_of(configured_method), info.source_hash
+        complete, source_hash = parameters_of(configured_method), info.version_of(parameters)
         for method_seed in range(seeds) if repeated else (seed,):
             timed = [rounds] if rounds else []
             identity = digest([IDENTITY, key, info.name, complete, source_hash, method_seed, *timed, *refused])

@@ -228,7 +228,7 @@ def _same_method(job: Job) -> MethodInfo:
             method = method_at(job.origin, job.method)
     except Exception as error:  # a plug-in may fail in any way
         raise InputError(f"the dask worker on {_host()} cannot import {job.origin}: {error}") from error
-    if method is None or method.source_hash != job.source_hash:
+    if method is None or method.version_of(job.parameters) != job.source_hash:
         raise InputError(
             f"the dask worker on {_host()} has another version of '{job.method}' in {job.origin}; "
             "install the same one there, and start the workers again"

@@ -1,0 +1,1 @@
+"""Methods that learn: what they share, and what their weights are."""

@@ -1,0 +1,89 @@
+"""What a method has whose answers depend on trained weights, and what trains them."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.core.problem import Instance, Skipped
+from bench.learning.weights import Arrays, Weights, read_weights
+from bench.plugins.declare import INFO
+
+FOLDER = "weights"
+
+
+class Trainer(Protocol):
+    """A network while it learns; what it computes with stays behind this."""
+
+    batch: int
+    """Graphs of one step."""
+
+    def step(self, graphs: Sequence[Instance], rng: np.random.Generator) -> float:
+        """Learn from some graphs, once; what the loss was before. All chance comes from `rng`."""
+
+    def loss(self, graph: Instance) -> float:
+        """The loss on a graph that is not learned from."""
+
+    def weights(self) -> Arrays:
+        """What `solve` would use now."""
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Everything that another trainer needs to go on as this one would, bit for bit."""
+
+    def restore(self, state: dict[str, NDArray[Any]]) -> None:
+        """Go on from a state."""
+
+
+@dataclass(frozen=True)
+class Learned:
+    """Base of a method with trained weights; one that `bench train` can train has a method ``trainer(seed)`` as well.
+
+    The weights that a method is shipped with are ``weights/<name>.npz`` beside its file.
+
+    Parameters
+    ----------
+    weights
+        A file of other weights, as ``bench train`` writes it; empty for those that are shipped.
+    """
+
+    weights: str = ""
+
+    @property
+    def weights_file(self) -> Path:
+        """Where its weights are."""
+        if self.weights:
+            return Path(self.weights)
+        return Path(str(sys.modules[type(self).__module__].__file__)).parent / FOLDER / f"{_name(self)}.npz"
+
+    @property
+    def weights_hash(self) -> str:
+        """Which weights it has; empty where none are shipped."""
+        return self.trained().sha256 if self.weights or self.weights_file.is_file() else ""
+
+    def trained(self) -> Weights:
+        """Its weights.
+
+        Raises
+        ------
+        Skipped
+            Where none are shipped and none are given.
+        InputError
+            Where the file that is given does not hold weights.
+        """
+        if not self.weights and not self.weights_file.is_file():
+            raise Skipped(f"it is not trained: `bench train {_name(self)}` makes its weights")
+        return read_weights(self.weights_file.resolve())
+
+    def note(self) -> str:
+        """Which weights they are, and what they have seen: for the notes of an estimate."""
+        weights = self.trained()
+        minutes = float(weights.provenance.get("cpu_seconds", 0)) / 60
+        return f"weights {weights.sha256[:8]}, trained on simulated graphs for {minutes:.0f} CPU-minutes"
+
+
+def _name(method: Learned) -> str:
+    return str(getattr(method, INFO).name)
