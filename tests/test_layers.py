@@ -24,6 +24,7 @@ ORDER = (
     ("execution",),
     ("running",),
     ("scoring",),
+    ("training",),
     ("reporting",),
     ("papers", "maps", "site", "advice"),
     ("api",),

@@ -34,6 +34,7 @@ from bench.cli import (
     site,
     solve,
     table,
+    train,
 )
 from bench.core.program import SCRIPT, program
 
@@ -86,7 +87,7 @@ VERBS = (
         new.new,
         check.check,
     ),
-    *(calibrate.calibrate, regression_pack.regression_pack, recommend.recommend),
+    *(calibrate.calibrate, regression_pack.regression_pack, recommend.recommend, train.train),
 )
 for verb in VERBS:
     app.command(verb.__name__.rstrip("_").replace("_", "-"))(verb)

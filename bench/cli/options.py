@@ -50,6 +50,10 @@ UseOption = Annotated[
         help="Of what comes with the measurements: weights,precisions,gravity or none.  [default: what a method can]",
     ),
 ]
+WeightsOption = Annotated[
+    Path | None,
+    typer.Option("--weights", metavar="FILE", help="What `train` wrote, for the method that it trained."),
+]
 DataDirOption = Annotated[
     Path | None, typer.Option("--data-dir", metavar="DIR", help="Folder where data are looked for first.")
 ]

@@ -15,6 +15,7 @@ from bench.cli.options import (
     Rerun,
     StyleOption,
     UseOption,
+    WeightsOption,
     console,
     used,
     wear,
@@ -63,6 +64,7 @@ def run(
         typer.Option(metavar="PATH", help="Absolute rotations, where -d names a path of your own."),
     ] = None,
     use: UseOption = None,
+    weights: WeightsOption = None,
     protocol: ProtocolOption = None,
     align: AlignOption = Align.L1,
     timing: Annotated[
@@ -106,6 +108,7 @@ def run(
         memory_gib=memory,
         truth=truth or "",
         use=used(use),
+        weights=weights,
         protocol=protocol,
         rerun=rerun.value,
         timing=timing,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bench.cli.options import PluginOption, UseOption, used
+from bench.cli.options import PluginOption, UseOption, WeightsOption, used
 from bench.core.words import counted
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ def solve(
     memory: Annotated[float, typer.Option(metavar="GIB")] = 16,
     threads: Annotated[int, typer.Option(help="Threads of the numerical libraries.")] = 1,
     use: UseOption = None,
+    weights: WeightsOption = None,
     plugin: PluginOption = None,
 ) -> None:
     """Solve one graph with one method and write the absolute rotations (world to camera)."""
@@ -30,10 +31,11 @@ def solve(
     from bench.core.problem import Instance
     from bench.execution.single import SingleSolver
     from bench.formats import read_graph, rotations_writer
+    from bench.learning.override import with_weights
     from bench.plugins.catalog import catalog, default_method
     from bench.scoring.doubts import doubts
 
-    chosen = method or default_method()
+    (chosen,) = with_weights([method or default_method()], weights)
     info, parameters = catalog("method", plugin or []).one(chosen)
     loaded = read_graph(graph)
     write = rotations_writer(out, loaded)

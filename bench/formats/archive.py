@@ -1,12 +1,13 @@
-"""NumPy archives from anywhere, read without trust: no pickle, and nothing allocated that the file does not hold.
+"""NumPy archives, written by rename, and read without trust: no pickle, nothing allocated that the file does not hold.
 
 An archive is a zip of arrays, and a few bytes of it can claim any size. Here the header of each array must agree
 with the size of its member, and all members together may not be far larger than the file itself.
 """
 
 import math
+import os
 import zipfile
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -54,6 +55,15 @@ def load(path: Path, wanted: Collection[str], texts: Collection[str] = ()) -> di
         raise InputError(
             f"{path}: cannot be read as a NumPy archive of plain arrays; write it with numpy.savez"
         ) from error
+
+
+def write(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write an uncompressed ``.npz``; a file of that name is replaced at once, never half."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with draft.open("wb") as file:
+        np.savez(file, **arrays)
+    draft.replace(path)
 
 
 def names(path: Path) -> frozenset[str]:

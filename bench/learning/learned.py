@@ -4,11 +4,12 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.core.errors import InputError, shown
 from bench.core.problem import Instance, Skipped
 from bench.learning.weights import Arrays, Weights, read_weights
 from bench.plugins.declare import INFO
@@ -52,6 +53,11 @@ class Learned:
 
     weights: str = ""
 
+    learns_from: ClassVar[tuple[str, ...]] = ()
+    """Selections of datasets that it is trained on; empty: those of the suite ``train``."""
+    start: ClassVar[str] = ""
+    """A selection of what it begins with, to be judged beside it; empty where there is no such method."""
+
     @property
     def weights_file(self) -> Path:
         """Where its weights are."""
@@ -72,17 +78,36 @@ class Learned:
         Skipped
             Where none are shipped and none are given.
         InputError
-            Where the file that is given does not hold weights.
+            Where the file that is given does not hold weights of this method.
         """
         if not self.weights and not self.weights_file.is_file():
             raise Skipped(f"it is not trained: `bench train {_name(self)}` makes its weights")
-        return read_weights(self.weights_file.resolve())
+        found = read_weights(self.weights_file.resolve())
+        if (of := found.provenance.get("method")) != _name(self):
+            raise InputError(f"{self.weights_file}: holds weights of {shown(of)}, not of '{_name(self)}'")
+        return found
 
     def note(self) -> str:
         """Which weights they are, and what they have seen: for the notes of an estimate."""
         weights = self.trained()
-        minutes = float(weights.provenance.get("cpu_seconds", 0)) / 60
-        return f"weights {weights.sha256[:8]}, trained on simulated graphs for {minutes:.0f} CPU-minutes"
+        return f"weights {weights.sha256[:8]}, trained on simulated graphs for {_duration(weights)}"
+
+    def about(self) -> dict[str, str]:
+        """What is known of its weights, by what it is; nothing where it has none."""
+        if not self.weights_hash:
+            return {}
+        weights = self.trained()
+        told = weights.provenance
+        return {
+            "weights": f"{weights.parameters:,} parameters, sha256 {weights.sha256[:16]}",
+            "trained by": f"{told.get('command', '?')} ({_duration(weights)})",
+            "validated": str(told.get("verdict", "not yet")),
+        }
+
+
+def _duration(weights: Weights) -> str:
+    minutes = float(weights.provenance.get("cpu_seconds", 0)) / 60
+    return f"{minutes:.0f} CPU-minutes" if minutes >= 1.5 else f"{60 * minutes:.0f} CPU-seconds"
 
 
 def _name(method: Learned) -> str:

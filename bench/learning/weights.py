@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -88,9 +87,5 @@ def _read(path: Path, _modified: int) -> Weights:
 def write_weights(path: Path, arrays: Arrays, provenance: Mapping[str, Any]) -> None:
     """Write arrays with their provenance and hash; a file of that name is replaced at once, never half."""
     text = json.dumps({**provenance, "sha256": hash_of(arrays)}, indent=1)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    members: dict[str, Any] = {name: np.asarray(array, np.float32) for name, array in arrays.items()}
-    with draft.open("wb") as file:
-        np.savez(file, **members, provenance=np.array(text))
-    draft.replace(path)
+    members = {name: np.asarray(array, np.float32) for name, array in arrays.items()}
+    archive.write(path, {**members, PROVENANCE: np.array(text)})

@@ -124,6 +124,7 @@ def _facts(info: Info) -> Mapping[str, str]:
         "promises": "; ".join(_promises(declared)),
         "traits": "; ".join(words for name, words in _IN_WORDS.items() if declared.get(name)),
         "meant for": f"at most {declared['max_cameras']} cameras" if declared.get("max_cameras") else "",
+        **(configured.about() if hasattr(configured, "about") else {}),
         "stands in": info.origin,
         "cites": info.cite,
     }

@@ -14,6 +14,7 @@ from bench.scoring.results import Results
 if TYPE_CHECKING:
     from bench.reporting.figures.data import Drawing
     from bench.scoring.calibration.agreement import Calibration
+    from bench.training.train import Trained
 
 EXTENSIONS = {"console": "txt", "markdown": "md", "csv": "csv", "latex": "tex"}
 
@@ -95,3 +96,18 @@ def write_calibration(found: "Calibration", folder: Path) -> list[Path]:
         written.append(folder / f"calibration.{EXTENSIONS[style]}")
         written[-1].write_text(render.text_of([grid], found.rows, style)[0], encoding="utf-8")
     return written + (save(paint(methods_on_both(found)), folder, "methods") if any(found.medians.values()) else [])
+
+
+def write_training(method: str, found: "Trained", folder: Path) -> list[Path]:
+    """Write how a training went as PNG, PDF and SVG, and its validation as CSV and Markdown."""
+    from bench.reporting.figures.learning import learning_curve
+    from bench.reporting.figures.paint_matplotlib import paint
+    from bench.reporting.figures.style import save
+    from bench.reporting.tables.trained import validation_grid
+
+    written = save(paint(learning_curve(method, found.curve)), folder, "learning-curve")
+    grid = validation_grid(found.rows, found.held_out)
+    for style in ("csv", "markdown"):
+        written.append(folder / f"validation.{EXTENSIONS[style]}")
+        written[-1].write_text(render.text_of([grid], found.frame, style)[0], encoding="utf-8")
+    return written

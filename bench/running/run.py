@@ -15,6 +15,7 @@ from bench.core.errors import InputError
 from bench.core.limits import Limits
 from bench.core.problem import Information
 from bench.core.program import program
+from bench.learning.override import with_weights
 from bench.plugins.catalog import catalog
 from bench.running.engines.local import Finished, LocalEngine
 from bench.running.engines.timing import TimingEngine
@@ -49,6 +50,8 @@ class Options:
         A file or folder with absolute rotations, where a dataset is named by the path of a graph.
     use
         What methods may use of what comes with the measurements; None for all that they can.
+    weights
+        File of other weights for the method that was trained to them.
     protocol
         Override the protocol of every dataset that has one.
     rerun
@@ -77,6 +80,7 @@ class Options:
     memory_gib: float | None = None
     truth: str = ""
     use: tuple[Information, ...] | None = None
+    weights: Path | None = None
     protocol: str | None = None
     rerun: Rerun = "never"
     timing: bool = False
@@ -235,7 +239,7 @@ def _resolved(
             raise InputError(f"a plug-in is broken: {known_methods.broken[origin]}")
     plugged_in = [info.name for info in known_methods if info.origin in own]
     changes: dict[str, Any] = {
-        "methods": tuple(methods) or (*suite.methods, *plugged_in),
+        "methods": with_weights(tuple(methods) or (*suite.methods, *plugged_in), options.weights),
         "seeds": options.seeds,
         "rounds": options.rounds,
         "timeout_s": options.timeout_s,
