@@ -9,7 +9,7 @@ from bench import Instance, Missing, Problem, Source, dataset, parameter, so3, s
 from bench.formats.npz import read_topology
 
 from ._files.folders import named, places, revision
-from ._simulated import correlated
+from ._simulated import correlated, snowball
 from ._simulated.correlated import Law
 from ._simulated.measurements import CODE, Measurements, OutlierModel
 from ._simulated.noise import Noise
@@ -17,6 +17,7 @@ from ._simulated.sizes import Sizes
 from ._simulated.statistics import statistics
 
 FOLDER = "viewgraphs"
+_CODE = (Path(__file__), Path(str(snowball.__file__)), *CODE, *correlated.CODE)  # decides what is simulated
 NOTE = "simulated measurements: only who is connected to whom is real; do not compare with published tables"
 
 
@@ -35,6 +36,9 @@ class ViewGraph:
     ----------
     scene
         One scene; None for all that are on disk.
+    cameras
+        Of a piece of the scene instead of the whole, another for each seed: what a breadth-first search from a random
+        camera, to neighbours in random order, meets first, with all edges within; None for the whole.
     noise
         ``correlated``, or as in ``erdos-renyi``.
     noise_deg
@@ -51,6 +55,7 @@ class ViewGraph:
     outliers: float | None = parameter(None, at_least=0, at_most=1)
     outlier_model: OutlierModel | None = None
     noise: Noise | Literal["correlated"] = "paper"
+    cameras: int | None = parameter(None, at_least=3)
 
     def __post_init__(self) -> None:
         if self.scene is not None and Path(self.scene).name != self.scene:
@@ -82,12 +87,16 @@ class ViewGraph:
 
     def _source(self, path: Path, seed: int) -> Source:
         name = "-".join([path.stem, *self._label()])
-        identity = revision([path, Path(__file__), *CODE, *correlated.CODE], repr(replace(self, scene=None)), str(seed))
+        identity = revision([path, *_CODE], repr(replace(self, scene=None)), str(seed))
         return Source(name, identity, lambda: self._load(path, name, seed, identity), seeded=True)
 
     def _load(self, path: Path, name: str, seed: int, identity: str) -> Instance:
         n, edges = read_topology(path)
-        rng = stream(seed, "data", "view-graph", path.stem)
+        rng, source = stream(seed, "data", "view-graph", path.stem, *self._size()), path.name
+        if self.cameras is not None:
+            whole = n
+            n, edges = snowball.piece(n, edges, self.cameras, rng)
+            source = f"{n} of the {whole} cameras of {source}"
         if self.noise == "correlated":
             truth, rotations, outliers = Law.drawn(rng, self.noise_deg, self.outliers).simulate(n, edges, rng)
         else:
@@ -99,7 +108,7 @@ class ViewGraph:
             truth,
             name=name,
             outliers=outliers,
-            source=f"{path.name}, simulated measurements with {self.noise} noise",
+            source=f"{source}, simulated measurements with {self.noise} noise",
             revision=identity,
             notes=(NOTE,),
             statistics=statistics(problem),
@@ -110,10 +119,15 @@ class ViewGraph:
         return Measurements(**given)
 
     def _label(self) -> list[str]:
+        """``cameras100`` of a piece, then what is given of the noise."""
         if self.noise != "correlated":
-            return self._independent().label()
+            return [*self._size(), *self._independent().label()]
         given = {"noise": self.noise_deg, "outliers": self.outliers}
-        return ["correlated-noise", *(f"{key}{value}" for key, value in given.items() if value is not None)]
+        told = (f"{key}{value}" for key, value in given.items() if value is not None)
+        return [*self._size(), "correlated-noise", *told]
+
+    def _size(self) -> list[str]:
+        return [] if self.cameras is None else [f"cameras{self.cameras}"]
 
 
 def _how_to_get(scene: str, folder: Path) -> str:

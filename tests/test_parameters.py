@@ -32,7 +32,7 @@ OUT_OF_RANGE = {
         "erdos-renyi[n=1]", "erdos-renyi[n=30001]", "erdos-renyi[missing=1]", "erdos-renyi[missing=-0.1]",
         "erdos-renyi[noise_deg=-1]", "erdos-renyi[outliers=1.5]", "folded[n=3]", "folded[share=1.1]",
         "folded[agreeing=-0.1]", "folded[across=2]", "folded[missing=1.1]", "folded[angle_deg=181]",
-        "folded[noise_deg=-1]", "view-graph[outliers=2]", "view-graph[noise_deg=181]",
+        "folded[noise_deg=-1]", "view-graph[outliers=2]", "view-graph[noise_deg=181]", "view-graph[cameras=2]",
         "photo-collection[n=1]", "photo-collection[n=1001]", "photo-collection[focal_error=-1]",
         "photo-collection[exif=2]", "photo-collection[distortion=1]", "photo-collection[noise_px=-1]",
         "photo-collection[features=1]", "photo-collection[mismatches=-1]", "photo-collection[one_sided=2]",

@@ -7,6 +7,7 @@ import pytest
 from scenes import load, the_source
 
 from bench.core.errors import InputError
+from bench.datasets._simulated.snowball import piece
 from bench.datasets.one_dsfm import OneDSfM
 from bench.datasets.view_graph import ViewGraph
 from bench.plugins.declare import Missing, Source
@@ -115,3 +116,36 @@ def test_correlated_errors_follow_the_seed_and_what_is_given(tmp_path: Path) -> 
     instance = load(given, tmp_path)
     assert instance.truth is not None
     assert np.median(np.degrees(instance.problem.residuals(instance.truth))) == pytest.approx(3.0, rel=0.35)
+
+
+def write_grid(path: Path, side: int = 12, islands: int = 4) -> Path:
+    """Cameras of a square grid, and pairs that hang on to nothing."""
+    ids = np.arange(side**2).reshape(side, side)
+    across, down = np.stack([ids[:, :-1], ids[:, 1:]], -1), np.stack([ids[:-1], ids[1:]], -1)
+    pairs = side**2 + np.arange(2 * islands).reshape(-1, 2)
+    edges = np.concatenate([pairs, across.reshape(-1, 2), down.reshape(-1, 2)])
+    return write_view_graph(path, n=side**2 + 2 * islands, edges=edges)
+
+
+def test_a_piece_is_what_lies_around_one_camera_with_all_edges_within(tmp_path: Path) -> None:
+    """Of a grid of 12 by 12 the 41 cameras within four steps of one, with 64 edges among them, or more at a border."""
+    write_grid(tmp_path / "Grid.npz")
+    problem = load(ViewGraph(cameras=41), tmp_path).problem
+    assert problem.n == 41
+    assert not problem.components.any()
+    assert 64 <= problem.m <= 2 * np.sqrt(41) * (np.sqrt(41) - 1)  # no set of cells has more neighbours than a square
+    n, edges = 6, np.array([[0, 1], [0, 2], [1, 2], [2, 3], [3, 4], [4, 5]], dtype=np.int32)
+    found = {tuple(map(tuple, piece(n, edges, 3, np.random.default_rng(s))[1].tolist())) for s in range(40)}
+    assert found == {((0, 1), (0, 2), (1, 2)), ((0, 1), (1, 2))}
+
+
+def test_pieces_follow_seed_and_size_and_never_exceed_the_largest_component(tmp_path: Path) -> None:
+    write_grid(tmp_path / "Grid.npz")
+    one, same, other = (load(ViewGraph(cameras=30, noise="correlated"), tmp_path, seed).problem for seed in (0, 0, 1))
+    np.testing.assert_array_equal(one.rotations, same.rotations)
+    assert one.m != other.m or (one.edges != other.edges).any()
+    assert load(ViewGraph(cameras=150), tmp_path).problem.n == 144
+    sources = [the_source(ViewGraph(cameras=cameras), tmp_path) for cameras in (None, 30, 31)]
+    assert len({source.revision for source in sources}) == 3
+    assert [source.name for source in sources] == ["Grid", "Grid-cameras30", "Grid-cameras31"]
+    assert "30 of the 152 cameras of Grid.npz" in sources[1].load().source
