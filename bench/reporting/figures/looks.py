@@ -20,7 +20,7 @@ LINES: tuple[Any, ...] = (
 )
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p", "*", "d")
 GREY = "#666666"
-SALT = 2700025  # found by trial: no two of our own methods share colour and line, so none shares colour and marker
+SALT = 365640939  # found by trial: no two of our own methods share colour and line, so none shares colour and marker
 FACTOR = 37  # prime to the numbers of markers and lines: values of a parameter that differ in a digit look different
 LABEL = 24  # characters of a line
 
@@ -45,8 +45,8 @@ def look_of(selection: str) -> Look:
     line or the marker of the method itself.
     """
     method, _, params = selection.removesuffix("]").partition("[")
-    hashed = hashlib.blake2s(f"{SALT} {method}".encode()).digest()[:4]
-    slot, color = divmod(int.from_bytes(hashed, "big"), len(COLORS))
+    hashed = int.from_bytes(hashlib.blake2s(method.encode()).digest()[:4], "big") * SALT % 2**32
+    slot, color = divmod(hashed >> 8, len(COLORS))
     line, marker, turn = slot, slot, 0
     for character in params:
         turn = FACTOR * turn + ord(character)
