@@ -65,6 +65,7 @@ def scene_notes(found: Scenes, marks: Mapping[str, tuple[str, str]], highlighted
         f"{highlighted}: at most {table.highlight_deg:g} degrees from {table.highlight_reference} in the same row, the "
         f"paper's rule{among}."
     )
+    yield from table.notes
     for letter, note in marks.values():
         yield f"({letter}) {note}."
     only = dict.fromkeys(row.quantity for row in found.rows if row.status == PUBLISHED_ONLY)

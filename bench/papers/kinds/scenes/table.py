@@ -48,6 +48,8 @@ class SceneTable(MeasuredItem):
         The paper's name of each scene, and ours.
     further
         Selections that the paper does not have, each a column of its own after the published ones.
+    notes
+        Sentences for below the table.
     variants
         For each published column further selections that could stand for it; `bench.papers.explain` tries them.
     """
@@ -61,6 +63,7 @@ class SceneTable(MeasuredItem):
     measured: Mapping[str, tuple[str, ...]]
     scenes: Mapping[str, str]
     further: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     variants: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def suites(self, name: str) -> tuple[Suite, ...]:
