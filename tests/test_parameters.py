@@ -38,6 +38,8 @@ OUT_OF_RANGE = {
         "photo-collection[features=1]", "photo-collection[mismatches=-1]", "photo-collection[one_sided=2]",
         "photo-collection[repeated=2]", "photo-collection[inliers=5]", "photo-collection[gravity_deg=-1]",
         "street-graph[n=1]", "street-graph[degree=1]", "street-graph[noise_deg=20]", "street-graph[outliers=0.5]",
+        "collection-graph[n=1]", "collection-graph[n=3001]", "collection-graph[degree=1]",
+        "collection-graph[noise_deg=0]", "collection-graph[outliers=0.5]",
     ],
 }  # fmt: skip
 
