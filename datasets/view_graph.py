@@ -110,7 +110,7 @@ class ViewGraph:
             outliers=outliers,
             source=f"{source}, simulated measurements with {self.noise} noise",
             revision=identity,
-            notes=(NOTE,),
+            notes=(NOTE, correlated.INFORMED) if self.noise == "correlated" else (NOTE,),
             statistics=statistics(problem),
         )
 

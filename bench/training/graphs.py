@@ -44,6 +44,11 @@ class Graphs:
         return total.hexdigest()
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know of them."""
+        return tuple(dict.fromkeys(note for graph in self.learned for note in graph.notes))
+
+    @property
     def sources(self) -> tuple[str, ...]:
         """What they were made of, in words."""
         return tuple(sorted({graph.source or graph.name for graph in self.learned}))

@@ -179,6 +179,7 @@ def _provenance(
         "graphs": len(graphs.learned),
         "graphs_sha256": graphs.sha256,
         "made_of": list(graphs.sources),
+        "notes": list(graphs.notes),
         "versions": provenance.versions(("torch",)) | {"python": sys.version.split()[0]},
         "bench": provenance.of_this_run()["bench"],
         "git": provenance.of_this_run()["git"],
