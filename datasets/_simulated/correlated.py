@@ -27,8 +27,8 @@ from .upright import Upright, smooth_function
 _MODULES = (draws, folds, overlaps, size_laws, upright)
 CODE = tuple(Path(str(file)) for file in (__file__, *(m.__file__ for m in _MODULES)))  # decides what is simulated
 INFORMED = (
-    "the law of the errors was set on Madrid Metropolis and Union Square of 1DSfM; Ellis Island, NYC Library and Piazza "
-    "del Popolo were looked at as checks"
+    "the law of the errors was set on Madrid Metropolis and Union Square of 1DSfM; Ellis Island, NYC Library and "
+    "Piazza del Popolo were looked at as checks"
 )
 _NEAR = np.radians(2.0)  # added to an angle before its logarithm is taken
 _RISE = 0.25  # of the logarithm of the coherence with the latent quality
