@@ -1,6 +1,6 @@
 """The method that is recommended: the quickest of those that do as well as the best, as far as anyone can tell."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from bench.core.outcome import OK
 from bench.plugins.selection import label
-from bench.scoring.inference.blocks import Configured
-from bench.scoring.inference.resampling import FLOOR_DEG
+from bench.reporting.tables.standing import geometric_mean
+from bench.scoring.results import CONFIGURED, Configured
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -120,12 +120,8 @@ def first(frame: "pd.DataFrame", tied: Collection[Configured], order: Sequence[C
 
 
 def _candidates(frame: "pd.DataFrame", tied: Collection[Configured]) -> list[Candidate]:
-    return [_candidate(method, rows, tied) for method, rows in _of_methods(frame).items()]
-
-
-def _of_methods(frame: "pd.DataFrame") -> "Mapping[Configured, pd.DataFrame]":
-    groups = frame.groupby(["method", "params"], sort=False)
-    return {(str(method), str(params)): rows for (method, params), rows in groups}
+    groups = frame.groupby(list(CONFIGURED), sort=False)
+    return [_candidate((str(method), str(params)), rows, tied) for (method, params), rows in groups]
 
 
 def _candidate(method: Configured, rows: "pd.DataFrame", tied: Collection[Configured]) -> Candidate:
@@ -139,5 +135,4 @@ def _figure(values: "pd.Series[float]") -> Figure:
     known = known[np.isfinite(known)]
     if not len(known):
         return Figure(*[float("inf")] * 3)
-    middle = float(np.exp(np.log(np.maximum(known, FLOOR_DEG)).mean()))
-    return Figure(middle, float(known.min()), float(known.max()))
+    return Figure(geometric_mean(known), float(known.min()), float(known.max()))
