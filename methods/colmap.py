@@ -16,7 +16,7 @@ from ._lib.stopwatch import Stopwatch
     title="COLMAP",
     cite="pan2024",
     requires=("pycolmap",),
-    install="python -m pip install 'pycolmap>=4'",
+    install="python -m pip install 'pycolmap>=4.2'",
     robust=True,
     uses=("weights", "precisions"),
     simple_graph=True,

@@ -1,5 +1,6 @@
 """The graphs of the regression pack, and the command that runs them."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -92,13 +93,55 @@ def test_the_command_says_what_fails(tmp_path: Path) -> None:
 def test_two_versions_are_paired(tmp_path: Path) -> None:
     """The same interpreter gives the same answers; a run of before is compared with one of today."""
     run = tmp_path / "run"
-    command = ("regression-pack", "-m", "l1-irls", "--seeds", 2, "--out", run)
+    command = ("regression-pack", "-m", "l1-irls", "--seeds", 1, "--out", run)
     done = bench(*command, "--python", sys.executable)
-    assert "44 jobs on small graphs: 0 failed" in done.stdout
+    assert "22 jobs on small graphs: 0 failed" in done.stdout
     assert done.stdout.splitlines()[-1] == "identical"
     assert (tmp_path / "run-other" / "plans").is_dir()
     again = bench(*command, "--against", tmp_path / "run-other")
     assert again.stdout.splitlines()[-1] == "identical"
+
+
+WRAPPER = '''
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench import Problem, method, so3
+from bench.methods.spectral import Spectral
+
+@method("wrapper", title="Wrapper", requires=("solverlib",))
+@dataclass(frozen=True)
+class Wrapper:
+    """What another library answers; its version 2 fails on two cameras and is off on every other graph."""
+
+    def solve(self, problem: Problem, rng: np.random.Generator) -> np.ndarray:
+        import solverlib
+
+        if problem.n == 2 and solverlib.OFF_DEG:
+            raise RuntimeError("two cameras")
+        off = so3.exp(np.radians(solverlib.OFF_DEG) * rng.standard_normal((problem.n, 3)))
+        return off @ Spectral().solve(problem, rng).rotations
+'''
+
+
+def test_a_library_that_became_worse_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two interpreters with two versions of a library: answers are paired, what changed is said, the exit code is 1."""
+    (tmp_path / "wrapper.py").write_text(WRAPPER)
+    for version, off_deg in ((1, 0), (2, 30)):
+        installed = tmp_path / f"v{version}" / f"solverlib-{version}.0.dist-info"
+        installed.mkdir(parents=True)
+        (installed / "METADATA").write_text(f"Metadata-Version: 2.1\nName: solverlib\nVersion: {version}.0\n")
+        (installed.parent / "solverlib.py").write_text(f"OFF_DEG = {off_deg}\n")
+    older, python = os.pathsep.join([str(tmp_path / "v1"), *sys.path]), tmp_path / "python"
+    python.write_text(f"#!/bin/sh\nPYTHONPATH='{older}' exec '{sys.executable}' \"$@\"\n")
+    python.chmod(0o755)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path / "v2"), os.environ.get("PYTHONPATH", "")]))
+    command = ("regression-pack", "-m", "wrapper", "--plugin", tmp_path / "wrapper.py", "--out", tmp_path / "run")
+    done = bench(*command, "--seeds", 2, "--python", python, code=1)
+    assert "solverlib 1.0 -> 2.0" in done.stderr
+    said = "wrapper on small-graphs/pair, seed 0: ok -> error(RuntimeError: two cameras) (and so for 1 other job)"
+    assert done.stdout.splitlines()[-1] == f"worse: wrapper; {said}"
 
 
 def test_bad_input_is_one_sentence(tmp_path: Path) -> None:

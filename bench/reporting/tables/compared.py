@@ -1,6 +1,6 @@
 """The comparison of two runs as text."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import pandas as pd
 
@@ -8,7 +8,7 @@ from bench.core.words import counted
 from bench.reporting import appearance
 from bench.reporting.tables.grid import ABSENT, Cell, Grid
 from bench.reporting.tables.printed import degrees, exact_seconds, p_value
-from bench.scoring.comparison import Comparison
+from bench.scoring.comparison import Change, Comparison
 from bench.scoring.paired import IDENTICAL, TIME
 
 WORDS = {"all": "all methods", "method": "over all scenes"}
@@ -42,7 +42,7 @@ def verdict(found: Comparison) -> str:
     """The last line: what has become of it all."""
     if found.identical:
         return "identical"
-    worse = [str(outcome) for outcome in found.outcomes if outcome.worse]
+    worse = _changes(outcome for outcome in found.outcomes if outcome.worse)
     rows = found.rows[found.rows["verdict"] == "worse"]
     if not worse and rows.empty:
         return "nothing is worse"
@@ -78,7 +78,18 @@ def _legend(found: Comparison, threshold: float) -> Iterator[str]:
     same = found.rows[(found.rows["level"] == "method") & (found.rows["verdict"] == IDENTICAL)]
     if len(same):
         yield f"Identical: {', '.join(dict.fromkeys(_label(row) for row in same.itertuples()))}."
-    yield from (f"{outcome}." for outcome in found.outcomes)
+    yield from (f"{change}." for change in _changes(found.outcomes))
+
+
+def _changes(outcomes: Iterable[Change]) -> list[str]:
+    """A sentence for each change of a method, however many jobs it is about."""
+    alike: dict[tuple[str, ...], list[Change]] = {}
+    for outcome in outcomes:
+        alike.setdefault((*outcome.cell[3:5], outcome.old, outcome.new), []).append(outcome)
+    return [
+        f"{first} (and so for {counted(len(others), 'other job')})" if others else f"{first}"
+        for first, *others in alike.values()
+    ]
 
 
 def _capital(text: str) -> str:
