@@ -41,9 +41,7 @@ def refined(
     return logits, _losses(graph, logits, sources, rounds)[0]
 
 
-def _losses(
-    graph: DirectedGraph, logits: Floats, sources: Sequence[int], rounds: int
-) -> tuple[list[float], Floats]:
+def _losses(graph: DirectedGraph, logits: Floats, sources: Sequence[int], rounds: int) -> tuple[list[float], Floats]:
     """The loss of each source, and the derivative of their sum with respect to the logits (m,)."""
     weights = weights_of(logits)
     slope, losses = np.zeros_like(weights), []
