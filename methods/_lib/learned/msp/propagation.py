@@ -169,39 +169,39 @@ def _collect(
             shares[k] = 0.0
             if levels[j] == 0:
                 continue
-            f, g, h, l = cameras[j, 0], cameras[j, 1], cameras[j, 2], cameras[j, 3]
+            f, g, h, v = cameras[j, 0], cameras[j, 1], cameras[j, 2], cameras[j, 3]
             weight = 1.0
             if k > 0:
                 a, b, c, d = measured[e, 0], measured[e, 1], measured[e, 2], measured[e, 3]
-                f, g, h, l = (
-                    a * f - b * g - c * h - d * l,
-                    a * g + b * f + c * l - d * h,
-                    a * h - b * l + c * f + d * g,
-                    a * l + b * h - c * g + d * f,
+                f, g, h, v = (
+                    a * f - b * g - c * h - d * v,
+                    a * g + b * f + c * v - d * h,
+                    a * h - b * v + c * f + d * g,
+                    a * v + b * h - c * g + d * f,
                 )
                 weight = weights[e]
             shares[k] = math.exp(SHARPNESS * weight * levels[j] / top)
-            if sides[i, 0] * f + sides[i, 1] * g + sides[i, 2] * h + sides[i, 3] * l < 0:
+            if sides[i, 0] * f + sides[i, 1] * g + sides[i, 2] * h + sides[i, 3] * v < 0:
                 shares[k] = -shares[k]
-            terms[k, 0], terms[k, 1], terms[k, 2], terms[k, 3] = f, g, h, l
-            p, q, r, s = p + shares[k] * f, q + shares[k] * g, r + shares[k] * h, s + shares[k] * l
+            terms[k, 0], terms[k, 1], terms[k, 2], terms[k, 3] = f, g, h, v
+            p, q, r, s = p + shares[k] * f, q + shares[k] * g, r + shares[k] * h, s + shares[k] * v
         scale = 1 / math.sqrt(p * p + q * q + r * r + s * s)
         p, q, r, s = scale * p, scale * q, scale * r, scale * s
         along = p * after[i, 0] + q * after[i, 1] + r * after[i, 2] + s * after[i, 3]
         f, g = scale * (after[i, 0] - along * p), scale * (after[i, 1] - along * q)
-        h, l = scale * (after[i, 2] - along * r), scale * (after[i, 3] - along * s)
+        h, v = scale * (after[i, 2] - along * r), scale * (after[i, 3] - along * s)
         if shares[0] != 0:
             before[i, 0], before[i, 1] = before[i, 0] + shares[0] * f, before[i, 1] + shares[0] * g
-            before[i, 2], before[i, 3] = before[i, 2] + shares[0] * h, before[i, 3] + shares[0] * l
+            before[i, 2], before[i, 3] = before[i, 2] + shares[0] * h, before[i, 3] + shares[0] * v
         for e in range(first[i], first[i + 1]):
             k = e - first[i] + 1
             if shares[k] == 0:
                 continue
             j, share = other[e], shares[k]
-            product = terms[k, 0] * f + terms[k, 1] * g + terms[k, 2] * h + terms[k, 3] * l
+            product = terms[k, 0] * f + terms[k, 1] * g + terms[k, 2] * h + terms[k, 3] * v
             of_weights[e] += SHARPNESS * levels[j] / top * share * product
             a, b, c, d = share * measured[e, 0], share * measured[e, 1], share * measured[e, 2], share * measured[e, 3]
-            before[j, 0] += a * f + b * g + c * h + d * l
-            before[j, 1] += a * g - b * f - c * l + d * h
-            before[j, 2] += a * h + b * l - c * f - d * g
-            before[j, 3] += a * l - b * h + c * g - d * f
+            before[j, 0] += a * f + b * g + c * h + d * v
+            before[j, 1] += a * g - b * f - c * v + d * h
+            before[j, 2] += a * h + b * v - c * f - d * g
+            before[j, 3] += a * v - b * h + c * g - d * f

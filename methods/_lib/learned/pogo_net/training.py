@@ -9,6 +9,7 @@ from bench import Floats, Instance, so3
 from ...descent.descent import Descent
 from ...descent.iterate import floored
 from ...starts import start_rotations
+from ..torch_errors import mean_loss
 from ..torch_layers import TorchGraph
 from ..torch_trainer import TorchTrainer
 from .torch_network import GateNet
@@ -16,7 +17,6 @@ from .view import PASSES, View, geman_mcclure
 
 LEARNED = 3  # passes of a step whose gates are learned from; the others only lead on
 BATCH, RATE, DECAY, CLIP = 2, 2e-3, 1e-4, 1.0
-SMALL_DEG, FAR = 0.5, 0.05  # errors are counted by log(1 + e / SMALL_DEG) + FAR e
 OF_EDGES, OF_GATES = 0.5, 0.1  # weights of the relative errors and of the gates, that of the cameras being 1
 
 
@@ -78,7 +78,7 @@ class Joint:
         errors = errors - errors.detach().median(dim=0).values
         inliers = torch.from_numpy(~instance.outliers).float()
         of_gates = nn.functional.binary_cross_entropy_with_logits(logits, inliers)
-        total = _counted(errors) + OF_EDGES * _counted(errors[i] - errors[j]) + OF_GATES * of_gates
+        total = mean_loss(errors) + OF_EDGES * mean_loss(errors[i] - errors[j]) + OF_GATES * of_gates
         return torch.as_tensor(total).float()
 
 
@@ -90,9 +90,3 @@ def least_squares(n: int, i: Tensor, j: Tensor, weights: Tensor, vectors: Tensor
     pull = weights[:, None] * vectors
     right = vectors.new_zeros((n, 3)).index_add(0, i, pull).index_add(0, j, -pull)
     return torch.as_tensor(torch.linalg.solve(laplacian, right))
-
-
-def _counted(vectors: Tensor) -> Tensor:
-    """Mean of f, see `Joint`, over rotation vectors (k, 3) in radians."""
-    errors = torch.rad2deg(torch.sqrt((vectors**2).sum(dim=1) + 1e-12))
-    return (torch.log1p(errors / SMALL_DEG) + FAR * errors).mean()

@@ -6,16 +6,14 @@ import numpy as np
 
 from bench import Floats, Problem, so3
 
-from ...consensus.evidence import noise_scale, support_by_triangles
-from ...consensus.half_edges import HalfEdges
 from ...descent.descent import Descent
 from ..directed import DirectedGraph
+from ..triangles import FEATURES, triangle_features
 
-WIDTH = 11  # features of a directed edge
+WIDTH = FEATURES + 7  # features of a directed edge
 PASSES = 8
 WIDEST_DEG, NARROWEST = 20.0, 0.5  # scale of the first pass, and of the last in units of the noise scale
-WIDER, EVERY = 3.0, 1e6  # noise scales at which triangles vouch besides 1; any triangle does at the last
-TURN, MANY = 0.5, 4.0  # radians, and logarithm of a number of triangles, that count as one
+TURN = 0.5  # radians, as which measured rotations count
 LEAST = 0.1  # added to a residual, in units of the scale, before its logarithm is taken
 
 
@@ -30,9 +28,7 @@ class View:
     forward
         (2m,) 1 where a directed edge leads as the problem has it, -1 where it is the other direction.
     fixed
-        (2m, 7) rotation vector of the measurement; logarithm of 1 + s, for the triangles s that close at the noise
-        scale; their share of all triangles at the edge, and of those that close at three times that scale; whether
-        there is any.
+        (2m, FEATURES + 3) rotation vector of the measurement, and what the triangles say, see `triangle_features`.
     scales
         (PASSES,) radians, falling evenly in their logarithms.
     """
@@ -45,11 +41,8 @@ class View:
     @classmethod
     def of(cls, problem: Problem) -> "View":
         """Of a connected problem without parallel edges."""
-        graph, half = DirectedGraph.of(problem), HalfEdges.of(problem)
-        noise = noise_scale(half, problem.m)
-        close, near, every = support_by_triangles(half, problem.m, noise * np.array([1, WIDER, EVERY]))
-        total = np.maximum(every, 1)
-        triangles = np.column_stack([np.log1p(close) / MANY, close / total, near / total, every > 0])
+        graph = DirectedGraph.of(problem)
+        triangles, noise = triangle_features(problem)
         turns = np.arcsinh(so3.log(graph.rotations) / TURN)
         scales = np.geomspace(max(np.radians(WIDEST_DEG), noise), NARROWEST * noise, PASSES)
         forward = np.where(graph.at == problem.edges[graph.edge, 0], 1.0, -1.0)
