@@ -1,6 +1,7 @@
 """MSP, its graph part: learned weights of edges, by which rotations spread from several cameras."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from ._lib.warm_up import Warm
 @dataclass(frozen=True)
 class MSP(Learned, Warm):
     """TODO."""
+
+    start: ClassVar[str] = "spanning-tree"
 
     steps: int = parameter(10, at_least=0)
 

@@ -1,15 +1,15 @@
 """PoGO-Net, reconstructed: gates that a network learns, on the edges of least squares problems."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from bench import Estimate, Learned, Problem, Trainer, method, so3
 
 from ._lib.descent.descent import Descent
-from ._lib.descent.iterate import floored
 from ._lib.learned.pogo_net.network import gates
-from ._lib.learned.pogo_net.view import View, geman_mcclure
+from ._lib.learned.pogo_net.view import LEAST_WEIGHT, View, geman_mcclure
 from ._lib.starts import start_rotations
 from ._lib.warm_up import Warm
 
@@ -47,13 +47,15 @@ class PoGONet(Learned, Warm):
     joint loss of `Joint`: absolute errors, relative errors, and which edges are outliers.
     """
 
+    start: ClassVar[str] = "spectral"
+
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         arrays, view = self.trained().arrays, View.of(problem)
         descent = Descent(problem, start_rotations("spectral", problem, rng), 0.0)
         weights = np.ones(problem.m)
         for scale in view.scales.tolist():
-            kernel = floored(geman_mcclure(descent.angles, scale))
-            weights = floored(kernel * gates(arrays, view.graph, view.features(descent, scale)))
+            found = gates(arrays, view.graph, view.features(descent, scale))
+            weights = found * geman_mcclure(descent.angles, scale) + LEAST_WEIGHT
             descent.step(weights)
         return Estimate(
             so3.from_quaternion(descent.cameras),

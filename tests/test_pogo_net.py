@@ -32,7 +32,7 @@ def network(tmp_path_factory: pytest.TempPathFactory) -> PoGONet:
     rng = np.random.default_rng(3)
     arrays = {name: rng.normal(0, 0.2, a.shape).astype(np.float32) for name, a in trainer.weights().items()}
     path = tmp_path_factory.mktemp("pogo") / "random.npz"
-    write_weights(path, arrays, {"cpu_seconds": 0})
+    write_weights(path, arrays, {"method": "pogo-net", "cpu_seconds": 0})
     return PoGONet(weights=str(path))
 
 

@@ -6,8 +6,8 @@ From a source, rotations spread over the graph in rounds. In round t camera i be
 
 over the neighbours j that are reached already and, where it is reached itself, over itself with w_ii = 1 and q_ii = 1.
 The l_j are levels in [0, 1]: how reliable the best way from the source is so far, l_i <- max(l_i, max_j w_ij l_j), with
-1 at the source; L_i is the largest of those in the sum. The signs s_ij = 1 or -1 turn every term to the side of that
-of largest weight, q and -q being one rotation. (The sum of the weights of a softmax would cancel in q_i.)
+1 at the source; L_i is the largest of those in the sum. The signs s_ij = 1 or -1 turn every term to the side of
+q_i or, where camera i was not reached, of the term of largest weight, q and -q being one rotation. (The sum of the weights of a softmax would cancel in q_i.)
 """
 
 import math
@@ -34,7 +34,7 @@ class Wave:
     cameras
         (t + 1, n, 4) unit quaternions of R_i, the source's being the identity in the beginning; 0 where not reached.
     sides
-        (t, n, 4) the term of largest weight in the sum of each round, to whose side the others are turned.
+        (t, n, 4) the term in the sum of each round to whose side the others are turned.
     """
 
     levels: Floats
@@ -120,7 +120,7 @@ def _spread(
                 terms[count, 3] = a * s + b * r - c * q + d * p
                 shares[count] = weights[e] * levels[t, j] / top
                 count += 1
-            best = np.argmax(shares[:count])
+            best = 0 if levels[t, i] > 0 else np.argmax(shares[:count])
             a, b, c, d = terms[best, 0], terms[best, 1], terms[best, 2], terms[best, 3]
             sides[t, i] = terms[best]
             p, q, r, s = 0.0, 0.0, 0.0, 0.0

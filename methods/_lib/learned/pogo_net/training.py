@@ -7,13 +7,12 @@ from torch import Tensor, nn
 from bench import Floats, Instance, so3
 
 from ...descent.descent import Descent
-from ...descent.iterate import floored
 from ...starts import start_rotations
 from ..torch_errors import mean_loss
 from ..torch_layers import TorchGraph
 from ..torch_trainer import TorchTrainer
 from .torch_network import GateNet
-from .view import PASSES, View, geman_mcclure
+from .view import LEAST_WEIGHT, PASSES, View, geman_mcclure
 
 LEARNED = 3  # passes of a step whose gates are learned from; the others only lead on
 BATCH, RATE, DECAY, CLIP = 2, 2e-3, 1e-4, 1.0
@@ -49,15 +48,15 @@ class Joint:
         total = torch.zeros(())
         for k, scale in enumerate(view.scales.tolist()):
             features = torch.from_numpy(view.features(descent, scale))
-            kernel = floored(geman_mcclure(descent.angles, scale))
+            kernel = torch.from_numpy(geman_mcclure(descent.angles, scale))
             with torch.set_grad_enabled(k in counted and torch.is_grad_enabled()):
                 logits = self._network(graph, features)[torch.from_numpy(view.forward > 0)]
                 order = torch.from_numpy(view.graph.edge[view.forward > 0].astype("int64"))
                 logits = torch.zeros(problem.m).index_copy(0, order, logits)
-                weights = torch.sigmoid(logits).double() * torch.from_numpy(kernel)
+                weights = torch.sigmoid(logits).double() * kernel + LEAST_WEIGHT
                 if k in counted:
                     total = total + self._loss(instance, descent, logits, weights) / LEARNED
-            descent.step(floored(weights.detach().numpy()))
+            descent.step(weights.detach().numpy())
         return total
 
     def _prepared(self, instance: Instance) -> tuple[View, Floats]:

@@ -14,6 +14,7 @@ WIDTH = FEATURES + 7  # features of a directed edge
 PASSES = 8
 WIDEST_DEG, NARROWEST = 20.0, 0.5  # scale of the first pass, and of the last in units of the noise scale
 TURN = 0.5  # radians, as which measured rotations count
+LEAST_WEIGHT = 1e-7  # of an edge, lest cameras come loose whose edges are all far off
 LEAST = 0.1  # added to a residual, in units of the scale, before its logarithm is taken
 
 
@@ -62,5 +63,5 @@ class View:
 
 
 def geman_mcclure(angles: Floats, scale: float) -> Floats:
-    """(m,) weights of the Geman-McClure loss: what the gates multiply."""
+    """(m,) weights of the Geman-McClure loss: what the gates multiply, before `LEAST_WEIGHT` is added."""
     return np.asarray(1 / (1 + (angles / scale) ** 2) ** 2)
