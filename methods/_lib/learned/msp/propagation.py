@@ -6,8 +6,9 @@ From a source, rotations spread over the graph in rounds. In round t camera i be
 
 over the neighbours j that are reached already and, where it is reached itself, over itself with w_ii = 1 and q_ii = 1.
 The l_j are levels in [0, 1]: how reliable the best way from the source is so far, l_i <- max(l_i, max_j w_ij l_j), with
-1 at the source; L_i is the largest of those in the sum. The signs s_ij = 1 or -1 turn every term to the side of
-q_i or, where camera i was not reached, of the term of largest weight, q and -q being one rotation. (The sum of the weights of a softmax would cancel in q_i.)
+1 at the source; L_i is the largest of those in the sum. The signs s_ij = 1 or -1 turn every term to the side of q_i or,
+where camera i was not reached, of the term of largest weight, q and -q being one rotation. (The sum of the weights of a
+softmax would cancel in q_i.)
 """
 
 import math
@@ -84,7 +85,7 @@ def gradient(graph: DirectedGraph, weights: Floats, wave: Wave, of_cameras: Floa
             directed,
         )
         back = earlier
-    return np.bincount(graph.edge, directed, minlength=len(weights))
+    return np.asarray(np.bincount(graph.edge, directed, minlength=len(weights)), dtype=float)
 
 
 @compiled
