@@ -11,6 +11,7 @@ from bench import Floats, Instance, so3
 from ..directed import DirectedGraph
 from ..torch_errors import mean_loss
 from ..torch_layers import TorchGraph
+from ..torch_quaternions import inverse, product
 from ..torch_trainer import TorchTrainer
 from . import network
 from .propagation import gradient, propagated
@@ -115,12 +116,14 @@ class Propagation(torch.autograd.Function):
 
 
 def _vectors(cameras: Tensor, truth: Floats) -> Tensor:
-    """(n, 3) about twice the vector part of the quaternions from cameras (n, 4) to the truth (n, 3, 3)."""
+    """(n, 3) rotation vectors, to first order, from the truth (n, 3, 3) to cameras (n, 4), seen in the world.
+
+    The world is turned to their geodesic median, and their median in each coordinate is subtracted: that is
+    differentiated, so that the rotation of the source, to which all cameras hold, is no error of theirs.
+    """
     rotations = so3.from_quaternion(cameras.detach().numpy())
     gauge = so3.geodesic_median(np.swapaxes(rotations, 1, 2) @ truth)
     true = torch.from_numpy(so3.to_quaternion(truth @ gauge.T))
-    scalar = (true * cameras).sum(dim=1, keepdim=True)
-    vector = (
-        true[:, :1] * cameras[:, 1:] - cameras[:, :1] * true[:, 1:] + torch.linalg.cross(cameras[:, 1:], true[:, 1:])
-    )
-    return torch.as_tensor(2 * vector * torch.sign(scalar.detach()))
+    between = product(inverse(true), cameras)
+    vectors = 2 * between[:, 1:] * torch.sign(between[:, :1].detach())
+    return vectors - vectors.median(dim=0).values
