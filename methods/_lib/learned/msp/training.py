@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from bench import Floats, Instance, so3
 
 from ..directed import DirectedGraph
-from ..torch_errors import mean_loss
+from ..torch_errors import inliers, mean_loss
 from ..torch_layers import TorchGraph
 from ..torch_quaternions import inverse, product
 from ..torch_trainer import TorchTrainer
@@ -56,14 +56,12 @@ class Joint:
     def __call__(self, instance: Instance, rng: np.random.Generator) -> Tensor:
         """The loss, which has nothing random in it."""
         assert instance.truth is not None
-        assert instance.outliers is not None
         view = self._view(instance)
         graph = TorchGraph(view.graph)
         directed = self._networks.weights(graph, torch.from_numpy(view.measured))
         edge = torch.from_numpy(view.graph.edge.astype("int64"))
         logits = directed.new_zeros(instance.problem.m).index_copy(0, edge, directed)
-        inliers = torch.from_numpy(~instance.outliers).float()
-        total = nn.functional.binary_cross_entropy_with_logits(logits, inliers)
+        total = nn.functional.binary_cross_entropy_with_logits(logits, inliers(instance))
         weights = torch.sigmoid(STEEPNESS * logits).double()
         sources = Sources.of(view.graph, weights.detach().numpy(), SOURCES)
         for source in sources.cameras:
@@ -71,7 +69,7 @@ class Joint:
             errors = _vectors(told, instance.truth)
             total = total + OF_START * mean_loss(errors) / len(sources.cameras)
         cameras, after = start(view.graph, logits.detach().numpy().astype(float), sources, STEPS)
-        return (total + self._fine_loss(view, graph, cameras, after, instance)).float()
+        return total + self._fine_loss(view, graph, cameras, after, instance)
 
     def _fine_loss(self, view: View, graph: TorchGraph, cameras: Floats, logits: Floats, instance: Instance) -> Tensor:
         assert instance.truth is not None
