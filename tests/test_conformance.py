@@ -62,6 +62,8 @@ CONFIGURATIONS = [
     "crdmf",
     "crdmf[init=[spanning-tree,random],candidates=1]",
     "crdmf[preset=paper,candidates=2,iterations=500]",
+    "msp[steps=[0,10]]",
+    "pogo-net",
 ]
 
 

@@ -19,7 +19,7 @@ OUT_OF_RANGE = {
         "gtsam-gnc[tolerance=0]", "gtsam-gnc[threshold_deg=0]", "hara[support=0]", "hara[filter_deg=0]",
         "hara[irls_iterations=-1]", "l1-irls[sigma_deg=0]", "l1-irls[tolerance_deg=-1]", "l1-irls[irls_iterations=-1]",
         "l1-irls[l1_iterations=-1]", "lie-averaging[tolerance_deg=0]", "lie-averaging[iterations=-1]",
-        "maks[tolerance=-1]", "maks[max_iterations=0]", "mpls[triangles=0]", "mpls[tolerance_deg=0]",
+        "maks[tolerance=-1]", "maks[max_iterations=0]", "msp[steps=-1]", "mpls[triangles=0]", "mpls[tolerance_deg=0]",
         "mpls[iterations=0]", "nuclear-norm[strength=-1]", "nuclear-norm[iterations=0]", "nuclear-norm[tolerance=0]",
         "quaternion[sweeps=0]", "r-godec[threshold=0]", "r-godec[tolerance=0]", "r-godec[iterations=0]",
         "rcd[tolerance=-1]", "rcd[max_epochs=0]", "robust-lm[sigma_deg=0]", "robust-lm[tolerance_deg=-1]",

@@ -51,6 +51,11 @@ class DirectedGraph:
         return np.searchsorted(self.at, np.arange(self.n)).astype(np.int32)
 
     @cached_property
+    def first(self) -> Ints:
+        """(n + 1,) where the edges of each camera begin, and where the last one's end."""
+        return np.append(self.starts, len(self.at)).astype(np.int32)
+
+    @cached_property
     def degree(self) -> Ints:
         """(n,) number of edges of each camera."""
         return np.bincount(self.at, minlength=self.n).astype(np.int32)

@@ -1,0 +1,1 @@
+"""MSP: propagation of rotations from several sources, and its derivative."""

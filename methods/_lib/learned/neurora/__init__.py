@@ -1,0 +1,1 @@
+"""CleanNet, the tree that it leads to, and FineNet."""
