@@ -22,6 +22,11 @@ class TorchGraph:
         """(n, k) sum over the edges of each camera of values (2m, k)."""
         return values.new_zeros((self.n, *values.shape[1:])).index_add(0, self.at, values)
 
+    def maxima(self, values: Tensor) -> Tensor:
+        """(n, k) maximum over the edges of each camera of values (2m, k)."""
+        to = self.at[:, None].expand(-1, values.shape[1])
+        return values.new_zeros((self.n, values.shape[1])).scatter_reduce(0, to, values, "amax", include_self=False)
+
     def means(self, values: Tensor) -> Tensor:
         """(n, k) mean over the edges of each camera of values (2m, k)."""
         return self.sums(values) / self.degree[:, None]
