@@ -57,6 +57,8 @@ CONFIGURATIONS = [
     "consensus[agreeing=[1,8]]",
     "hara",
     "hara[filter_deg=180,irls_iterations=0]",
+    "rago",
+    "rago[outer=[0,1]]",
     "tg-mcmc",
     "tg-mcmc[init=[spectral,random],noise_deg=0]",
     "crdmf",
