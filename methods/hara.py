@@ -11,15 +11,11 @@ from ._lib.descent.descent import Descent
 from ._lib.descent.losses import LOSSES
 from ._lib.graph.all_triangles import AllTriangles
 from ._lib.graph.confidence import confidence
-from ._lib.graph.hierarchical_tree import hierarchical_tree, support_levels
+from ._lib.graph.hierarchical_tree import USUAL_ERROR, supported_tree
 from ._lib.graph.restricted import restricted
 from ._lib.graph.trees import tree_edges
 from ._lib.graph.triangles import note_on_missing
 from ._lib.warm_up import Warm
-
-QUANTILES = (0.1, 0.2, 0.3)
-USUAL_ERROR = 1.0  # squared Frobenius norm, 41.4 degrees; larger loop errors tell nothing of the noise
-ROUNDING = 1e-12  # of a squared Frobenius norm
 
 
 @method(
@@ -73,10 +69,7 @@ class HARA(Warm):
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         triangles = AllTriangles.of(problem)
-        usual = triangles.errors[triangles.errors < USUAL_ERROR]
-        thresholds = np.maximum(np.quantile(usual, QUANTILES), ROUNDING) if len(usual) else np.zeros(0)
-        levels = support_levels(problem, triangles, thresholds, self.support)
-        tree = hierarchical_tree(problem, levels, self.support * len(thresholds))
+        tree = supported_tree(problem, triangles, self.support)
         notes = [*note_on_missing(triangles.missing(problem.m), "no triplet supports them")]
         if tree.averaged:
             notes.append(f"cameras averaged for want of triplet support: {tree.averaged}")

@@ -58,6 +58,8 @@ CONFIGURATIONS = [
     "hara",
     "hara[filter_deg=180,irls_iterations=0]",
     "lits",
+    "rago",
+    "rago[outer=[0,1]]",
     "tg-mcmc",
     "tg-mcmc[init=[spectral,random],noise_deg=0]",
     "crdmf",

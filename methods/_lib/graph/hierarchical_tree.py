@@ -10,6 +10,9 @@ from bench import Floats, Ints, Problem, so3
 from ..loops.edge_kernels import compiled
 from .all_triangles import AllTriangles
 
+QUANTILES = (0.1, 0.2, 0.3)
+USUAL_ERROR = 1.0  # squared Frobenius norm, 41.4 degrees; larger loop errors tell nothing of the noise
+ROUNDING = 1e-12  # of a squared Frobenius norm
 MEDIAN_ITERATIONS = 10
 MEDIAN_TOLERANCE = 1e-3  # radians
 NEAREST = 1e-9  # keeps the weight of a rotation that the median meets finite
@@ -21,6 +24,14 @@ class Tree:
 
     rotations: Floats
     averaged: int
+
+
+def supported_tree(problem: Problem, triangles: AllTriangles, support: int) -> Tree:
+    """The tree of steps 1 and 2 of `HARA`: `support` triangles are as good as more."""
+    usual = triangles.errors[triangles.errors < USUAL_ERROR]
+    thresholds = np.maximum(np.quantile(usual, QUANTILES), ROUNDING) if len(usual) else np.zeros(0)
+    levels = support_levels(problem, triangles, thresholds, support)
+    return hierarchical_tree(problem, levels, support * len(thresholds))
 
 
 def support_levels(problem: Problem, triangles: AllTriangles, thresholds: Floats, most: int) -> Ints:

@@ -1,0 +1,1 @@
+"""RAGO: rectified edges and moved cameras in turn, each by a recurrent unit that reads a graph of costs."""
