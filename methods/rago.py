@@ -38,8 +38,8 @@ class RAGO(Warm, Learned):
 
        - Edge: from h of the edge six numbers in (0, 1) tell how far E_ij moves towards R_i R_j^T and R_ij, by axis.
        - Camera: one more layer, over what was read at edges and h of cameras, gives each edge three weights, by axis,
-         and h of the camera a share of the step. R_i turns by that share of the weighted mean of the differences of
-         R_ij from R_i R_j^T, all cameras at once.
+         and h of the camera the share of the step, at least a quarter. R_i turns by that share of the weighted mean of
+         the differences of R_ij from R_i R_j^T, all cameras at once.
 
     The number of updates is fixed: none is chosen by what comes out.
 
@@ -52,13 +52,13 @@ class RAGO(Warm, Learned):
       the gauge: costs are differences with their sign, on a logarithmic scale; rotations R_i are no feature.
     - Units do not put out rotations but gates and weights of what the measurements ask for; the weights are those
       of the Geman-McClure loss at 1.1 degrees, times factors within e^-4 and e^4. Noise-free graphs are solved exactly.
-    - 24 features for 48, MLPs of two layers for three and six: 42 thousand parameters for 255 thousand in the code.
+    - 24 features for 48, MLPs of two layers for three and six: 41 thousand parameters for 255 thousand in the code.
     - E starts at the measurement, not at the identity, and its loss has the true rotation as its target, as in the
       paper (the code has another). The losses are log(1 + error / 0.6 degrees), means over edges.
     - The start is a tree by triangles, where the paper takes that of another network (CleanNet-SPT, from
       NeuRoRA), as nothing but the tree's quality is asked of it.
-    - It is trained on simulated graphs with three times three camera updates; the paper's four in five rounds are
-      what is run.
+    - It is trained on simulated graphs, by three rounds of three camera updates (the paper: three of four), on at most
+      2,500 edges of each in a step; the paper's five rounds of four are what is run.
 
     Parameters
     ----------
