@@ -14,7 +14,10 @@ from ..torch_trainer import TorchTrainer
 from .torch_network import GateNet
 from .view import LEAST_WEIGHT, PASSES, View, geman_mcclure
 
-LEARNED = 3  # passes of a step whose gates are learned from; the others only lead on
+EARLIER, SHARE = (
+    2,
+    0.25,
+)  # passes of a step that are learned from beside the last, and what each counts; the rest lead on
 BATCH, RATE, DECAY, CLIP = 2, 2e-3, 1e-4, 1.0
 OF_EDGES, OF_GATES = 0.5, 0.1  # weights of the relative errors and of the gates, that of the cameras being 1
 
@@ -28,9 +31,9 @@ def trainer(seed: int) -> TorchTrainer:
 
 
 class Joint:
-    """The joint loss on a graph, in some passes drawn at random.
+    """The joint loss on a graph: half in the last pass, a quarter each in two others that are drawn at random.
 
-    In each of these it is the mean over the cameras of f(error of R_i), plus half the mean over the edges of f(error of
+    In each it is the mean over the cameras of f(error of R_i), plus half the mean over the edges of f(error of
     R_i R_j^T), plus a tenth of the cross-entropy of the gates against the inliers; f(e) = log(1 + e / 0.5) + 0.05 e,
     in degrees. The least squares problem of a pass is differentiated; the passes before it are not.
     """
@@ -44,7 +47,8 @@ class Joint:
         view, start = self._prepared(instance)
         graph, problem = TorchGraph(view.graph), instance.problem
         descent = Descent(problem, start, 0.0)
-        counted = rng.choice(PASSES, LEARNED, replace=False)
+        counted = {PASSES - 1: 1 - EARLIER * SHARE}
+        counted |= dict.fromkeys(rng.choice(PASSES - 1, EARLIER, replace=False).tolist(), SHARE)
         total = torch.zeros(())
         for k, scale in enumerate(view.scales.tolist()):
             features = torch.from_numpy(view.features(descent, scale))
@@ -55,7 +59,7 @@ class Joint:
                 logits = torch.zeros(problem.m).index_copy(0, order, logits)
                 weights = torch.sigmoid(logits).double() * kernel + LEAST_WEIGHT
                 if k in counted:
-                    total = total + self._loss(instance, descent, logits, weights) / LEARNED
+                    total = total + counted[k] * self._loss(instance, descent, logits, weights)
             descent.step(weights.detach().numpy())
         return total
 

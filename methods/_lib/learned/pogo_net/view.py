@@ -10,11 +10,12 @@ from ...descent.descent import Descent
 from ..directed import DirectedGraph
 from ..triangles import FEATURES, triangle_features
 
-WIDTH = FEATURES + 7  # features of a directed edge
+WIDTH = FEATURES + 8  # features of a directed edge
 PASSES = 8
 WIDEST_DEG, NARROWEST = 20.0, 0.5  # scale of the first pass, and of the last in units of the noise scale
 TURN = 0.5  # radians, as which measured rotations count
 LEAST_WEIGHT = 1e-7  # of an edge, lest cameras come loose whose edges are all far off
+FIRST = 3.0  # logarithm of a scale in units of the last, as which it counts
 LEAST = 0.1  # added to a residual, in units of the scale, before its logarithm is taken
 
 
@@ -53,13 +54,14 @@ class View:
         """(2m, WIDTH) of the directed edges, where the cameras of a descent are now; float32.
 
         The residuals are those in the frames of the cameras, log(R_ij R_j R_i^T) in units of the scale, so that the
-        world may be turned.
+        world may be turned. The last feature is the same for all: how far the scale is from the last one.
         """
         world = (self.forward[:, None] / scale) * descent.vectors[self.graph.edge]
         own = so3.from_quaternion(descent.cameras)[self.graph.at]
         seen = np.einsum("eab,eb->ea", own, world)
         size = np.log(LEAST + descent.angles[self.graph.edge] / scale)
-        return np.column_stack([self.fixed, np.arcsinh(seen), size]).astype(np.float32)
+        stage = np.full(len(size), np.log(scale / self.scales[-1]) / FIRST)
+        return np.column_stack([self.fixed, np.arcsinh(seen), size, stage]).astype(np.float32)
 
 
 def geman_mcclure(angles: Floats, scale: float) -> Floats:
