@@ -1,6 +1,7 @@
 """NeuRoRA: a network that tells outliers, a spanning tree that avoids them, and a network that refines it."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ._lib.learned.neurora.tree import both_ways, inlier_tree, kept_edges
     supervised=True,
     robust=True,
     simple_graph=True,
+    invariant_to_deg=None,  # CleanNet has learned how cameras are held, so that their frames matter; labels do not
 )
 @dataclass(frozen=True)
 class NeuRoRA(Learned):
@@ -54,6 +56,16 @@ class NeuRoRA(Learned):
     """
 
     passes: int = parameter(4, at_least=0)
+
+    learns_from: ClassVar[tuple[str, ...]] = (
+        "neurora-graphs[fewest=60,most=200]",
+        "view-graph[noise=correlated,cameras=[40,70,130]]",
+        "neurora-graphs[fewest=100,most=240]",
+        "view-graph[noise=correlated,cameras=[50,90,150]]",
+        "photo-collection[layout=[facade,square,street,rooms,orbit,aerial],n=50]",
+        "view-graph[noise=correlated,cameras=[60,100,160]]",
+    )
+    start: ClassVar[str] = "neurora[passes=0]"
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         arrays = self.trained().arrays

@@ -5,7 +5,7 @@ any time: CleanNet, and FineNet from the start that CleanNet's present probabili
 goes. The losses are theirs, with these deviations: CleanNet's distance is a mean over edges and its weight the ratio
 that their sum has on four graphs of 3000 edges, so that large graphs do not count more; FineNet's loss is the mean over
 three passes, each of which starts where the one before ended, without its gradient, and turns linear at 0.01 in place
-of 0.05, because below its bound it hardly falls; both learn at a rate of 1e-3 from two graphs a step, the gradient is
+of 0.05, because below its bound it hardly falls; both learn at a rate of 2e-3 from two graphs a step, the gradient is
 clipped, and the weights are running means.
 """
 
@@ -32,7 +32,7 @@ HOPELESS_DEG = 90.0
 PASSES = 3
 _RECTIFIED, _RECTIFIED_BETA = 5.0, 0.2
 _CAMERAS, _FINE_BETA = 0.25, 0.01
-_RATE, _DECAY = 1e-3, 1e-4
+_RATE, _DECAY = 2e-3, 1e-4
 _BATCH, _CLIP = 2, 10.0
 
 

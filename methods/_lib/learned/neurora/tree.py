@@ -22,7 +22,7 @@ def inlier_tree(problem: Problem, inlier: Floats) -> EdgeIds:
     from scipy.sparse.csgraph import dijkstra
 
     costs = np.where(inlier > TRUSTED, *_COSTS)
-    distance = dijkstra(problem.adjacency(costs), indices=hub(problem))
+    distance = dijkstra(problem.adjacency(costs), indices=[hub(problem)])[0]
     ascent = np.diff(distance[problem.edges], axis=1)[:, 0]
     shortest = np.flatnonzero(np.abs(ascent) == costs)
     child = problem.edges[shortest, (ascent[shortest] > 0).astype(np.intp)]
