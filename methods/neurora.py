@@ -12,7 +12,7 @@ from ._lib.graph.trees import propagated
 from ._lib.learned.directed import DirectedGraph
 from ._lib.learned.layers import Arrays, sigmoid, within
 from ._lib.learned.neurora.networks import clean_net, fine_net
-from ._lib.learned.neurora.tree import both_ways, inlier_tree, kept_edges
+from ._lib.learned.neurora.tree import both_ways, inlier_tree, kept_edges, start_rotations
 
 
 @method(
@@ -31,23 +31,24 @@ class NeuRoRA(Learned):
 
     1. **CleanNet**, four layers of messages along edges in both directions, gives each direction of an edge the
        probability that its measurement is less than 20 degrees wrong; s_ij is the product of the two.
+       It also tells what the edge should have measured.
     2. The tree of shortest paths from the camera of highest degree, where an edge costs 0.1, and 1.1 with s_ij below a
-       half. Rotations are propagated along it.
+       half. What CleanNet makes of the measurements is propagated along it.
     3. **FineNet**, four more such layers, sees the edges with s_ij over 0.1, the cameras, and what each edge asks of
-       its camera, R_i^T R_ij R_j in the world of the root, and turns all cameras; this is done `passes` times. The
-       answer is that of the passes, or the tree, from which the edges that FineNet sees differ least (the mean angle).
+       its camera, R_i^T R_ij R_j in the world of the root, and turns all cameras; this is done `passes` times.
+    4. The answer is that pass, or the start, or the tree by the measurements themselves, from which the edges that
+       FineNet sees differ least (the mean angle): without errors it is exact.
 
     Source: Purkait, Chin and Reid, ECCV 2020, and their code, whose networks, features, costs and limits these are.
     They published no weights for real scenes: these networks were trained here, on simulated graphs alone, from
     which no scene of 1DSfM was left out because none was in.
 
-    Deviations: FineNet turns the cameras `passes` times, and the best of the passes is chosen as said, where theirs
-    is one; its change multiplies the camera's quaternion from the right, in the world in which what the edges ask is
-    told, where theirs is added to the quaternion; vector parts of these go in multiplied by 5 and come out divided by
-    5; all quaternions that go in have a scalar that is not negative. The tree is propagated with the measurements,
-    where theirs takes what CleanNet makes of them, which in our trainings was worse; of several shortest paths the
-    one over the edge of the largest s_ij is taken; and the edges of the tree are always kept. For those of the
-    training see ``_lib/learned/neurora/trainer.py``.
+    Deviations: FineNet turns the cameras `passes` times, and step 4 chooses, where theirs turns them once; its change
+    multiplies the camera's quaternion from the right, in the world in which what the edges ask is told, where theirs
+    is added to the quaternion; vector parts of these go in multiplied by 30 and come out divided by it; all
+    quaternions that go in have a scalar that is not negative. What CleanNet makes of the two directions of an edge
+    is averaged; of several shortest paths the one over the edge of the largest s_ij is taken; and the edges of the
+    tree are always kept. For those of the training see ``_lib/learned/neurora/trainer.py``.
 
     Parameters
     ----------
@@ -70,17 +71,21 @@ class NeuRoRA(Learned):
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         arrays = self.trained().arrays
         graph = DirectedGraph.of(problem)
-        inlier = both_ways(graph, sigmoid(clean_net(within(arrays, "clean"), graph)[0]))
+        logits, rectified = clean_net(within(arrays, "clean"), graph)
+        inlier = both_ways(graph, sigmoid(logits))
         tree = inlier_tree(problem, inlier)
         kept = restricted(problem, kept_edges(inlier, tree))
-        candidates = [propagated(problem, tree), *self._passes(within(arrays, "fine"), kept, propagated(problem, tree))]
-        costs = [float(kept.residuals(rotations).mean()) for rotations in candidates]
-        best = int(np.argmin(costs))
+        start = start_rotations(problem, tree, graph, rectified)
+        passes = self._passes(within(arrays, "fine"), kept, start)
+        found = {"the tree of measurements": propagated(problem, tree), "the start": start}
+        found |= {f"pass {k} of {self.passes}": rotations for k, rotations in enumerate(passes, 1)}
+        costs = {name: float(kept.residuals(rotations).mean()) for name, rotations in found.items()}
+        best = min(costs, key=costs.__getitem__)
         return Estimate(
-            candidates[best],
+            found[best],
             edge_weights=inlier,
             iterations=self.passes,
-            stop_reason=f"the best is after {best} of {self.passes} passes",
+            stop_reason=f"the best is {best}",
             cost=costs[best],
             notes=(self.note(),),
         )

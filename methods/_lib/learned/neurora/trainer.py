@@ -4,7 +4,7 @@ Theirs are trained one after the other, for thousands of epochs; here every step
 any time: CleanNet, and FineNet from the start that CleanNet's present probabilities lead to, through which no gradient
 goes. The losses are theirs, with these deviations: CleanNet's distance is a mean over edges and its weight the ratio
 that their sum has on four graphs of 3000 edges, so that large graphs do not count more; FineNet's loss is the mean over
-three passes, each of which starts where the one before ended, without its gradient, and turns linear at 0.01 in place
+three passes, each of which starts where the one before ended, without its gradient, and turns linear at 0.005 in place
 of 0.05, because below its bound it hardly falls; both learn at a rate of 2e-3 from two graphs a step, the gradient is
 clipped, and the weights are running means.
 """
@@ -17,21 +17,20 @@ from torch.nn.functional import binary_cross_entropy_with_logits, smooth_l1_loss
 from bench import Floats, Instance, Problem, so3
 
 from ...graph.restricted import restricted
-from ...graph.trees import hub, propagated
 from ..directed import DirectedGraph
-from ..quaternions import inverse, product
+from ..quaternions import inverse, product, unit
 from ..torch_layers import TorchGraph
 from ..torch_quaternions import inverse as torch_inverse
 from ..torch_quaternions import product as torch_product
 from ..torch_trainer import TorchTrainer
 from .torch_networks import CleanNet, FineNet
-from .tree import both_ways, inlier_tree, kept_edges
+from .tree import both_ways, inlier_tree, kept_edges, start_rotations
 
 INLIER_DEG = 20.0
 HOPELESS_DEG = 90.0
 PASSES = 3
 _RECTIFIED, _RECTIFIED_BETA = 5.0, 0.2
-_CAMERAS, _FINE_BETA = 0.25, 0.01
+_CAMERAS, _FINE_BETA = 0.25, 0.005
 _RATE, _DECAY = 2e-3, 1e-4
 _BATCH, _CLIP = 2, 10.0
 
@@ -50,19 +49,21 @@ class Networks(nn.Module):
         logits, rectified = self.clean(of_graph)
         inlier = both_ways(directed, torch.sigmoid(logits.detach()).double().numpy())
         of_clean = clean_loss(of_graph, logits, rectified, _single(truth))
-        return of_clean + self._refinement(graph.problem, inlier, truth)
+        tree = inlier_tree(graph.problem, inlier)
+        start = start_rotations(graph.problem, tree, directed, unit(rectified.detach().double().numpy()))
+        return of_clean + self._refinement(restricted(graph.problem, kept_edges(inlier, tree)), start, truth)
 
-    def _refinement(self, problem: Problem, inlier: Floats, truth: Floats) -> Tensor:
-        """FineNet's loss, 0 where the start is beyond hope; `truth` (n, 4) is pinned at the root of the tree."""
-        tree = inlier_tree(problem, inlier)
-        start, pinned = so3.to_quaternion(propagated(problem, tree)), product(truth, inverse(truth[hub(problem)]))
+    def _refinement(self, kept: Problem, rotations: Floats, truth: Floats) -> Tensor:
+        """FineNet's loss from `rotations` (n, 3, 3), in whose world the truth is told; 0 where they are beyond hope."""
+        root = int(np.argmin(so3.angle(rotations)))
+        start, pinned = so3.to_quaternion(rotations), product(truth, inverse(truth[root]))
         if np.mean(_angles(product(start, inverse(pinned)))) > np.radians(HOPELESS_DEG):
             return torch.zeros(())
-        kept = TorchGraph(DirectedGraph.of(restricted(problem, kept_edges(inlier, tree))))
+        graph = TorchGraph(DirectedGraph.of(kept))
         cameras, losses = _single(start), []
         for _ in range(PASSES):
-            cameras = self.fine(kept, cameras.detach())
-            losses.append(fine_loss(kept, cameras, _single(pinned)))
+            cameras = self.fine(graph, cameras.detach())
+            losses.append(fine_loss(graph, cameras, _single(pinned)))
         return torch.stack(losses).mean()
 
 

@@ -1,12 +1,15 @@
-"""The spanning tree that CleanNet's inlier probabilities lead to, from which FineNet starts."""
+"""The spanning tree that CleanNet leads to, from which FineNet starts."""
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench import Floats, Problem, so3
 
-from ...graph.trees import EdgeIds, hub
+from ...graph.trees import EdgeIds, hub, propagated
 from ..directed import DirectedGraph
+from ..quaternions import inverse, positive, product
 
 TRUSTED = 0.5
 DROPPED = 0.1
@@ -39,6 +42,20 @@ def kept_edges(inlier: Floats, tree: EdgeIds) -> NDArray[np.bool_]:
 
 def both_ways(graph: DirectedGraph, inlier: Floats) -> Floats:
     """(m,) product of the inlier probabilities (2m,) of the two directions of each edge."""
-    product = np.empty(len(inlier) // 2)
-    product[graph.edge] = inlier * inlier[graph.reverse]
-    return product
+    of_edges = np.empty(len(inlier) // 2)
+    of_edges[graph.edge] = inlier * inlier[graph.reverse]
+    return of_edges
+
+
+def start_rotations(problem: Problem, tree: EdgeIds, graph: DirectedGraph, rectified: Floats) -> Floats:
+    """Rotations (n, 3, 3) along a tree, by the means of `rectified` (2m, 4) over both directions of each edge.
+
+    The camera of highest degree is the identity.
+    """
+    apart = positive(product(rectified[graph.reverse], rectified))  # 1 where the two directions agree
+    halfway = product(rectified, inverse(apart + np.array([1, 0, 0, 0])))
+    forward = graph.at < graph.other
+    of_edges = np.empty((problem.m, 4))
+    of_edges[graph.edge[forward]] = halfway[forward]
+    rotations = propagated(replace(problem, rotations=so3.from_quaternion(of_edges)), tree)
+    return np.asarray(rotations @ rotations[hub(problem)].T)
