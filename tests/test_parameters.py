@@ -20,7 +20,8 @@ OUT_OF_RANGE = {
         "hara[irls_iterations=-1]", "l1-irls[sigma_deg=0]", "l1-irls[tolerance_deg=-1]", "l1-irls[irls_iterations=-1]",
         "l1-irls[l1_iterations=-1]", "lie-averaging[tolerance_deg=0]", "lie-averaging[iterations=-1]",
         "maks[tolerance=-1]", "maks[max_iterations=0]", "msp[steps=-1]", "mpls[triangles=0]", "mpls[tolerance_deg=0]",
-        "mpls[iterations=0]", "nuclear-norm[strength=-1]", "nuclear-norm[iterations=0]", "nuclear-norm[tolerance=0]",
+        "mpls[iterations=0]", "neurora[passes=-1]", "nuclear-norm[strength=-1]",
+        "nuclear-norm[iterations=0]", "nuclear-norm[tolerance=0]",
         "quaternion[sweeps=0]", "r-godec[threshold=0]", "r-godec[tolerance=0]", "r-godec[iterations=0]",
         "rago[outer=-1]", "rcd[tolerance=-1]", "rcd[max_epochs=0]", "robust-lm[sigma_deg=0]",
         "robust-lm[tolerance_deg=-1]", "robust-lm[iterations=-1]", "sdp[eps=0]", "sdp[max_iterations=0]",
@@ -41,6 +42,7 @@ OUT_OF_RANGE = {
         "street-graph[n=1]", "street-graph[degree=1]", "street-graph[noise_deg=20]", "street-graph[outliers=0.5]",
         "collection-graph[n=1]", "collection-graph[n=3001]", "collection-graph[degree=1]",
         "collection-graph[noise_deg=0]", "collection-graph[outliers=0.5]",
+        "neurora-graphs[fewest=2]", "neurora-graphs[most=5001]",
     ],
 }  # fmt: skip
 

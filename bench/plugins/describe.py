@@ -64,13 +64,13 @@ class Description:
 
 def described(info: Info) -> Description:
     """Describe a plug-in; a citation that is not found is a fact of it instead of an entry."""
-    text, sections = _sections(info.cls.__doc__ or "")
+    text, _ = _sections(info.cls.__doc__ or "")
     facts = dict(_facts(info))
     try:
         entries = references(info)
     except InputError as error:
         entries, facts = {}, facts | {"cites": str(error)}
-    return Description(info, text, _parameters(info.cls, sections.get("Parameters", "")), facts, entries)
+    return Description(info, text, _parameters(info.cls), facts, entries)
 
 
 def _sections(docstring: str) -> tuple[str, dict[str, str]]:
@@ -91,8 +91,11 @@ def _meanings(section: str) -> dict[str, str]:
     return found
 
 
-def _parameters(cls: type, section: str) -> tuple[Parameter, ...]:
-    hints, meanings = typed.fields_of(cast(Any, cls)), _meanings(section)
+def _parameters(cls: type) -> tuple[Parameter, ...]:
+    """All of them, also those that it inherits, which are explained where they are declared."""
+    hints, meanings = typed.fields_of(cast(Any, cls)), dict[str, str]()
+    for base in reversed(cls.__mro__):
+        meanings |= _meanings(_sections(base.__doc__ or "")[1].get("Parameters", ""))
     return tuple(
         Parameter(
             field.name,

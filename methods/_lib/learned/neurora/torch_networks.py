@@ -5,6 +5,7 @@ from torch import Tensor, nn
 from ..torch_layers import TorchGraph
 from ..torch_quaternions import inverse, positive, product, unit
 from ..torch_trunk import HIDDEN, Trunk
+from .networks import UNIT
 
 
 class CleanNet(nn.Module):
@@ -28,17 +29,24 @@ class CleanNet(nn.Module):
 
 
 class FineNet(nn.Module):
-    """Refines cameras, from where they are and from what their edges ask of them there."""
+    """Refines cameras, from where they are and from what their edges ask of them there; untrained it changes nothing.
+
+    The turn that it finds for a camera is applied in the world, where that which its edges ask is told.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.trunk = Trunk(4, 4)
         self.out = nn.Linear(HIDDEN, 4)
+        nn.init.zeros_(self.out.weight)
+        nn.init.zeros_(self.out.bias)
 
     def forward(self, graph: TorchGraph, cameras: Tensor) -> Tensor:
         """One pass: better cameras (n, 4) than `cameras` (n, 4), unit quaternions where the root is near 1."""
-        features = self.trunk(graph, positive(cameras), residuals(graph, cameras))[0]
-        return unit(positive(cameras) + self.out(features))
+        cameras = positive(cameras)
+        asked = residuals(graph, cameras) * cameras.new_tensor([1, *3 * [UNIT]])
+        turn = self.out(self.trunk(graph, cameras, asked)[0]) / UNIT
+        return unit(product(cameras, turn + turn.new_tensor([1, 0, 0, 0])))
 
 
 def residuals(graph: TorchGraph, cameras: Tensor) -> Tensor:

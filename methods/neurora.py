@@ -1,0 +1,105 @@
+"""NeuRoRA: a network that tells outliers, a spanning tree that avoids them, and a network that refines it."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bench import Estimate, Floats, Learned, Problem, Trainer, method, parameter, so3
+
+from ._lib.graph.restricted import restricted
+from ._lib.graph.trees import propagated
+from ._lib.learned.directed import DirectedGraph
+from ._lib.learned.layers import Arrays, sigmoid, within
+from ._lib.learned.neurora.networks import clean_net, fine_net
+from ._lib.learned.neurora.tree import both_ways, inlier_tree, kept_edges, start_rotations
+
+
+@method(
+    "neurora",
+    title="NeuRoRA, trained on simulations",
+    cite="purkait2020",
+    requires=("scipy",),
+    supervised=True,
+    robust=True,
+    simple_graph=True,
+    invariant_to_deg=None,  # CleanNet has learned how cameras are held, so that their frames matter; labels do not
+)
+@dataclass(frozen=True)
+class NeuRoRA(Learned):
+    """Refines, by a trained network, the spanning tree that another trained network found free of outliers.
+
+    1. **CleanNet**, four layers of messages along edges in both directions, gives each direction of an edge the
+       probability that its measurement is less than 20 degrees wrong; s_ij is the product of the two.
+       It also tells what the edge should have measured.
+    2. The tree of shortest paths from the camera of highest degree, where an edge costs 0.1, and 1.1 with s_ij below a
+       half. What CleanNet makes of the measurements is propagated along it.
+    3. **FineNet**, four more such layers, sees the edges with s_ij over 0.1, the cameras, and what each edge asks of
+       its camera, R_i^T R_ij R_j in the world of the root, and turns all cameras; this is done `passes` times.
+    4. The answer is that pass, or the start, or the tree by the measurements themselves, from which the edges that
+       FineNet sees differ least (the mean angle): without errors it is exact.
+
+    Source: Purkait, Chin and Reid, ECCV 2020, and their code, whose networks, features, costs and limits these are.
+    They published no weights for real scenes: these networks were trained here, on simulated graphs alone, from
+    which no scene of 1DSfM was left out because none was in.
+
+    Deviations: FineNet turns the cameras `passes` times, and step 4 chooses, where theirs turns them once; its change
+    multiplies the camera's quaternion from the right, in the world in which what the edges ask is told, where theirs
+    is added to the quaternion; vector parts of these go in multiplied by 30 and come out divided by it; all
+    quaternions that go in have a scalar that is not negative. What CleanNet makes of the two directions of an edge
+    is averaged; of several shortest paths the one over the edge of the largest s_ij is taken; and the edges of the
+    tree are always kept. For those of the training see ``_lib/learned/neurora/trainer.py``.
+
+    Parameters
+    ----------
+    passes
+        Of FineNet; 0 returns the tree.
+    """
+
+    passes: int = parameter(4, at_least=0)
+
+    learns_from: ClassVar[tuple[str, ...]] = (
+        "neurora-graphs[fewest=60,most=200]",
+        "view-graph[noise=correlated,cameras=[40,70,130]]",
+        "neurora-graphs[fewest=100,most=240]",
+        "view-graph[noise=correlated,cameras=[50,90,150]]",
+        "photo-collection[layout=[facade,square,street,rooms,orbit,aerial],n=50]",
+        "view-graph[noise=correlated,cameras=[60,100,160]]",
+    )
+    start: ClassVar[str] = "neurora[passes=0]"
+
+    def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
+        arrays = self.trained().arrays
+        graph = DirectedGraph.of(problem)
+        logits, rectified = clean_net(within(arrays, "clean"), graph)
+        inlier = both_ways(graph, sigmoid(logits))
+        tree = inlier_tree(problem, inlier)
+        kept = restricted(problem, kept_edges(inlier, tree))
+        start = start_rotations(problem, tree, graph, rectified)
+        passes = self._passes(within(arrays, "fine"), kept, start)
+        found = {"the tree of measurements": propagated(problem, tree), "the start": start}
+        found |= {f"pass {k} of {self.passes}": rotations for k, rotations in enumerate(passes, 1)}
+        costs = {name: float(kept.residuals(rotations).mean()) for name, rotations in found.items()}
+        best = min(costs, key=costs.__getitem__)
+        return Estimate(
+            found[best],
+            edge_weights=inlier,
+            iterations=self.passes,
+            stop_reason=f"the best is {best}",
+            cost=costs[best],
+            notes=(self.note(),),
+        )
+
+    def _passes(self, arrays: Arrays, kept: Problem, start: Floats) -> list[Floats]:
+        """Rotations (n, 3, 3) after each pass."""
+        graph, cameras, found = DirectedGraph.of(kept), so3.to_quaternion(start), []
+        for _ in range(self.passes):
+            cameras = fine_net(arrays, graph, cameras)
+            found.append(so3.from_quaternion(cameras))
+        return found
+
+    def trainer(self, seed: int) -> Trainer:
+        """CleanNet and FineNet with random weights, and how they learn."""
+        from ._lib.learned.neurora.trainer import trainer
+
+        return trainer(seed)
