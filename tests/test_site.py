@@ -35,6 +35,18 @@ def made(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def reference():
+    """The committed results."""
+    return read_all([REFERENCE])
+
+
+@pytest.fixture(scope="module")
+def pages(made, reference):
+    """The site of the committed results and of one run more."""
+    return rendered([*reference, *read_all([made / "kept"])], "All")
+
+
 def released(folder: Path, name: str, version: str, finished: str) -> None:
     """A copy of the exported results, of another version."""
     content = json.loads((folder / "kept/mine" / PROVENANCE).read_text())
@@ -69,8 +81,7 @@ def test_an_export_says_what_the_run_says(made):
     assert "a host" not in (made / "kept/mine/records.jsonl").read_text()
 
 
-def test_every_link_of_the_site_leads_somewhere(made):
-    pages = rendered(read_all([REFERENCE, made / "kept"]), "All")
+def test_every_link_of_the_site_leads_somewhere(pages, reference):
     assert {"index.html", "runs.html", "methods/l1-irls.html", "methods/alpha.html", "data/mine.csv"} <= set(pages)
     links = {name: Links(text) for name, text in pages.items() if name.endswith(".html")}
     for name, own in links.items():
@@ -79,7 +90,7 @@ def test_every_link_of_the_site_leads_somewhere(made):
             target = (Path(name).parent / path).as_posix().replace("methods/../", "") if path else name
             assert target in pages, f"{name}: {href}"
             assert not part or part in links[target].ids, f"{name}: {href}"
-    board_links = board(read_all([REFERENCE]))["links"]
+    board_links = board(reference)["links"]
     assert {path for paths in board_links.values() for path in paths.values()} > {"methods/colmap.html"}
 
 
@@ -88,8 +99,7 @@ def test_names_that_hold_markup_stay_text(made):
         assert not name.endswith(".html") or "img" not in Links(text).tags
 
 
-def test_every_number_has_its_protocol_and_its_command(made):
-    pages = rendered(read_all([REFERENCE]), "All")
+def test_every_number_has_its_protocol_and_its_command(pages):
     page = pages["methods/l1-irls.html"]
     assert page.count("truth-subgraph") >= 4
     assert 'href="../runs.html#run-methods-1dsfm"' in page
@@ -106,10 +116,10 @@ def test_history_by_version(made, tmp_path):
     assert set(versions["values"]) == {"0.1.0 (2026-01-01)", "0.2.0 (2026-02-02)"}
 
 
-def test_the_picture_names_what_no_other_beats():
+def test_the_picture_names_what_no_other_beats(reference):
     from bench.reporting.tables.standing import overall
 
-    (table,) = (t for t in read_all([REFERENCE]) if t.name == "methods-1dsfm")
+    (table,) = (t for t in reference if t.name == "methods-1dsfm")
     drawn = picture(overall(table.results.frame, table.results.ties)[1])
     best = sorted((p for p in drawn.points if p.best), key=lambda p: p.seconds)
     assert len(best) > 3
@@ -154,7 +164,7 @@ def test_a_folder_of_something_else_is_left_alone(made, tmp_path):
 def test_the_commands(made, tmp_path):
     done = command("export", made / "run", "--into", "kept", cwd=tmp_path)
     assert done.stdout.split() == [str(Path("kept") / n) for n in ("scores.csv", PROVENANCE, "records.jsonl")]
-    done = command("site", "kept", REFERENCE, "--out", "pages", cwd=tmp_path)
+    done = command("site", "kept", REFERENCE / "speed", "--out", "pages", cwd=tmp_path)
     assert done.stdout.strip() == str(Path("pages/index.html"))
     done = command("site", tmp_path / "pages", code=2)
     assert "neither a run nor a folder of results" in done.stderr
