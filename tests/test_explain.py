@@ -167,7 +167,8 @@ def test_a_cell_has_a_pleasant_name(name: str) -> None:
 
 
 def test_a_scene_alone_stands_for_every_measured_column() -> None:
-    assert cells("Ellis", *table()) == [("Ellis Island", "DMF-Synch"), ("Ellis Island", "L1-IRLS")]
+    item, rows = table()
+    assert cells("Ellis", item, rows) == [("Ellis Island", column) for column in item.measured]
     assert cells("Ellis/L1-IRLS/DMF-Synch", *table()) == [("Ellis Island", "L1-IRLS"), ("Ellis Island", "DMF-Synch")]
 
 
@@ -177,13 +178,19 @@ def test_a_scene_alone_stands_for_every_measured_column() -> None:
         ("Elis Island/L1-IRLS", "did you mean 'Ellis Island'"),
         ("Ellis/L1-IRSL", "did you mean 'L1-IRLS'"),
         ("M/L1-IRLS", "may be Madrid Metropolis or Montreal Notre Dame"),
-        ("Ellis/NeuRoRA", "published only; measured are DMF-Synch, L1-IRLS"),
         ("", "no scene ''"),
     ],
 )
 def test_a_wrong_name_is_one_sentence(name: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         cells(name, *table())
+
+
+def test_a_column_that_is_published_only_has_no_cell_to_explain() -> None:
+    item, rows = table()
+    alone = replace(item, measured={**item.measured, "NeuRoRA": ()})
+    with pytest.raises(InputError, match="published only; measured are DMF-Synch, MSP, PoGO-Net, L1-IRLS"):
+        cells("Ellis/NeuRoRA", alone, rows)
 
 
 def test_the_first_candidate_is_what_the_table_measures() -> None:
