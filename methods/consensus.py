@@ -87,11 +87,12 @@ class Consensus(Warm):
         final = Descent(problem, so3.from_quaternion(cameras), 0.0)
         narrow = settling.settle(final, np.radians(TOGETHER_DEG), STEPS)
         scales, errors = widened(problem, settling, final, narrow)
+        weights = settling.weights(final.angles, scales)
         taken_over = f"; {pieces} piece{'s' * (pieces > 1)} of others taken over" if pieces else ""
         return Estimate(
             so3.from_quaternion(final.cameras),
-            edge_weights=settling.weights(final.angles, scales),
-            camera_sigma=camera_sigma(problem, final.vectors, final.angles, narrow, errors),
+            edge_weights=weights,
+            camera_sigma=camera_sigma(problem, final, weights, scales, errors, noise),
             iterations=final.iterations,
             stop_reason="all steps done",
             cost=-judge.of_angles(final.angles),

@@ -89,6 +89,10 @@ def test_laplacian_solutions_are_least_squares(edges: Ints) -> None:
         root = np.sqrt(weights)[:, None]
         wanted = np.linalg.lstsq(root * incidence, root * vectors, rcond=None)[0]
         np.testing.assert_allclose(x, wanted, atol=1e-9)
+        inverse = solver.inverse(weights)
+        for right in (incidence.T @ (root**2 * vectors), incidence.T @ root):
+            columns = (incidence.T * weights) @ incidence @ inverse(right)
+            np.testing.assert_allclose(columns, right, atol=1e-9)
 
 
 def test_along_sequences_factors_are_dense_in_a_band_and_say_the_same() -> None:
@@ -116,6 +120,9 @@ def test_large_graphs_are_solved_by_conjugate_gradients_to_the_tolerance(monkeyp
         found = LaplacianSolver(problem, tolerance).solve(weights, vectors)
         error = np.linalg.norm(found - exact) / np.linalg.norm(exact)
         assert 1e-9 < error < 3 * tolerance
+        right = np.eye(problem.n)[:, :4] - 1 / problem.n
+        approximate, wanted = (LaplacianSolver(problem, t).inverse(weights)(right) for t in (tolerance, 0.0))
+        assert np.linalg.norm(approximate - wanted) < 3 * tolerance * np.linalg.norm(wanted)
     monkeypatch.setattr(laplacian, "MOST_PRODUCTS", 1)
     np.testing.assert_allclose(LaplacianSolver(problem, 1e-4).solve(weights, vectors), exact, atol=1e-12)
 

@@ -4,7 +4,7 @@ python tests/tools/ablate_consensus.py --data-dir DIR
 """
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from unittest.mock import patch
@@ -41,10 +41,10 @@ VARIANTS: dict[str, list[tuple[object, str, object]]] = {
 }
 
 
-def instances(selection: str, seeds: int, every: int, data_dir: Path) -> Iterator[Instance]:
+def instances(selection: str, seeds: Iterable[int], every: int, data_dir: Path | None) -> Iterator[Instance]:
     """Instances with truth."""
     for info, parameters in catalog("dataset").select([selection]):
-        for seed in range(seeds):
+        for seed in seeds:
             found = [s for s in info.configure(parameters).sources(data_dir, seed) if isinstance(s, Source)]
             for source in found[::every]:
                 instance = source.load()
@@ -75,7 +75,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data-dir", type=Path, required=True)
     data_dir = parser.parse_args().data_dir
-    loaded = {name: list(instances(*what, data_dir)) for name, what in GRAPHS.items()}
+    loaded = {name: list(instances(a, range(b), c, data_dir)) for name, (a, b, c) in GRAPHS.items()}
     print("| | " + " | ".join(f"{name} ({len(found)})" for name, found in loaded.items()) + " |")
     print("|:--|" + ":-:|" * len(loaded))
     for variant, changes in VARIANTS.items():

@@ -1,5 +1,7 @@
 """Reweighted least squares over the rotations of all cameras, which move at every step."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from bench import Floats, Problem
@@ -59,6 +61,10 @@ class Descent:
         self.iterations += 1
         self._measure()
         return length
+
+    def inverse(self, weights: Floats) -> Callable[[Floats], Floats]:
+        """Return the inverse of the normal matrix of `weights` (m,); see `LaplacianSolver.inverse`."""
+        return self._laplacian.inverse(weights)
 
     def move_to(self, cameras: Floats) -> None:
         """Put the cameras elsewhere, at quaternions (n, 4)."""

@@ -1,5 +1,6 @@
 """Graph Laplacians: those whose edges carry matrices, and weighted systems solved many times on one graph."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -90,6 +91,38 @@ class LaplacianSolver:
         x -= x.mean(axis=0)
         return x
 
+    def inverse(self, weights: Floats) -> Callable[[Floats], Floats]:
+        """Return the map from right-hand sides (n, k), whose columns sum to zero, to the x (n, k) of mean zero.
+
+        The normal matrix of `weights` (m,) is factored once, however often the map is used.
+        """
+        n = self._problem.n
+        i, j = self._problem.edges.T
+        degrees = np.asarray(np.bincount(i, weights, n) + np.bincount(j, weights, n))
+        if self._factored is None:
+            return lambda right: self._approximate(weights, degrees, right)
+        within = self._factored.factor(weights, degrees)
+
+        def solved(right: Floats) -> Floats:
+            x = np.zeros(right.shape)
+            x[:-1] = within(right[:-1])
+            return np.asarray(x - x.mean(axis=0))
+
+        return solved
+
+    def _approximate(self, weights: Floats, degrees: Floats, right: Floats) -> Floats:
+        """As the map of `inverse`, three columns at a time."""
+        result = np.empty(right.shape)
+        for first in range(0, right.shape[1], 3):
+            columns = right[:, first : first + 3]
+            padded, x = np.zeros((len(right), 3)), np.zeros((len(right), 3))
+            padded[:, : columns.shape[1]] = columns
+            if not _conjugate_gradients(self._problem.edges, weights, degrees, padded, self._tolerance, x):
+                self._factored = _factored(self._problem)
+                return self.inverse(weights)(right)
+            result[:, first : first + 3] = x[:, : columns.shape[1]]
+        return result
+
 
 def _conjugate_gradients(
     edges: Ints, weights: Floats, degrees: Floats, right: Floats, tolerance: float, x: Floats
@@ -140,7 +173,10 @@ def _factored(problem: Problem) -> "_DenseSystem | _BandedSystem | _SparseSystem
 
 
 class _DenseSystem:
-    """`solve` takes weights (m,), their sums (n,) and right-hand sides (n - 1, 3), and returns x (n - 1, 3)."""
+    """`solve` takes weights (m,), their sums (n,) and right-hand sides (n - 1, 3), and returns x (n - 1, 3).
+
+    `factor` takes the first two, and returns the map from right-hand sides (n - 1, k) to x (n - 1, k).
+    """
 
     def __init__(self, problem: Problem) -> None:
         self._edges = problem.edges
@@ -154,6 +190,16 @@ class _DenseSystem:
         if info != 0:
             raise np.linalg.LinAlgError(f"the Laplacian is not positive definite (row {info})")
         return np.asarray(x)
+
+    def factor(self, weights: Floats, degrees: Floats) -> Callable[[Floats], Floats]:
+        from scipy.linalg import lapack
+
+        rows = np.empty_like(self._rows)
+        edge_kernels.dense_laplacian(self._edges, weights, degrees, rows)
+        factor, info = lapack.dpotrf(rows.T, lower=1, overwrite_a=1)
+        if info != 0:
+            raise np.linalg.LinAlgError(f"the Laplacian is not positive definite (row {info})")
+        return lambda right: np.asarray(lapack.dpotrs(factor, right, lower=1)[0])
 
 
 class _BandedSystem:
@@ -169,6 +215,9 @@ class _BandedSystem:
         self._width = 1 + int(np.ptp(self._places[inside], axis=1).max(initial=0))
 
     def solve(self, weights: Floats, degrees: Floats, right: Floats) -> Floats:
+        return self.factor(weights, degrees)(right)
+
+    def factor(self, weights: Floats, degrees: Floats) -> Callable[[Floats], Floats]:
         from scipy.linalg import lapack
 
         rows = np.zeros((len(self._order), self._width))
@@ -176,9 +225,13 @@ class _BandedSystem:
         factor, info = lapack.dpbtrf(rows.T, lower=1, overwrite_ab=1)
         if info != 0:
             raise np.linalg.LinAlgError(f"the Laplacian is not positive definite (row {info})")
-        x = np.empty_like(right)
-        x[self._order] = lapack.dpbtrs(factor, right[self._order], lower=1)[0]
-        return x
+
+        def solved(right: Floats) -> Floats:
+            x = np.empty_like(right)
+            x[self._order] = lapack.dpbtrs(factor, right[self._order], lower=1)[0]
+            return x
+
+        return solved
 
 
 class _SparseSystem:
@@ -203,12 +256,20 @@ class _SparseSystem:
         self._kept = kept
 
     def solve(self, weights: Floats, degrees: Floats, right: Floats) -> Floats:
+        return self.factor(weights, degrees)(right)
+
+    def factor(self, weights: Floats, degrees: Floats) -> Callable[[Floats], Floats]:
         off_diagonal = -weights[self._kept]
         values = np.concatenate([off_diagonal, off_diagonal, degrees[:-1]])
         self._matrix.data = np.asarray(np.bincount(self._entry, values), dtype=np.float64)  # parallel edges add up
-        x = np.empty_like(right)
-        x[self._order] = _factor(self._matrix, "NATURAL").solve(right[self._order])
-        return x
+        factor = _factor(self._matrix, "NATURAL")
+
+        def solved(right: Floats) -> Floats:
+            x = np.empty_like(right)
+            x[self._order] = factor.solve(right[self._order])
+            return x
+
+        return solved
 
 
 def _factor(matrix: "sparse.csc_array[np.float64]", ordering: Literal["MMD_AT_PLUS_A", "NATURAL"]) -> "SuperLU":
