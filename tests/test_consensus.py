@@ -42,9 +42,9 @@ def test_triangles_vouch_for_edges_by_how_well_they_close() -> None:
     for i, j, k in itertools.combinations(range(12), 3):
         if {(i, j), (j, k), (i, k)} <= set(known):
             (a, first), (b, second), (c, third) = known[i, j], known[j, k], known[i, k]
-            angle = so3.angle_between(first @ second, third)
+            chord = 4 * np.sin(so3.angle_between(first @ second, third) / 4)
             for edge in (a, b, c):
-                wanted[:, edge] += (1 + (angle / scales) ** 2) ** -2
+                wanted[:, edge] += (1 + (chord / scales) ** 2) ** -2
     assert wanted.max() > 1
     np.testing.assert_allclose(support_by_triangles(HalfEdges.of(problem), problem.m, scales), wanted, atol=1e-9)
 

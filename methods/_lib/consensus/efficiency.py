@@ -10,6 +10,7 @@ from .settling import Settling, wider_scales
 
 WIDER = (2.0, 4.0, 8.0)  # times the scales of the cameras
 STEPS = 5  # of least squares at each
+HOPE = 1.05  # times the best standard error so far; wider losses are tried that promise less than that as residuals are
 MOST_LEVERAGE = 0.9
 
 
@@ -36,14 +37,14 @@ def standard_error(problem: Problem, prior: Floats, angles: Floats, scales: Floa
 
     wider = wider_scales(problem.edges, scales)
     precision = prior / wider**2
-    weights = precision * (1 + (angles / wider) ** 2) ** -2
+    weights = precision / (1 + (angles / wider) ** 2) ** 2
     strength = sums(weights)
     leverage = np.minimum(weights * (1 / strength[i] + 1 / strength[j]), MOST_LEVERAGE)
     angles = angles / (1 - leverage)
     square = (angles / wider) ** 2
-    weight = (1 + square) ** -2
+    weight = 1 / (1 + square) ** 2
     meat = sums((precision * weight * angles) ** 2 / 3)
-    bread = sums(precision * (weight - 4 / 3 * square * (1 + square) ** -3))
+    bread = sums(precision * weight * (1 - 4 / 3 * square / (1 + square)))
     errors = np.where(bread > 0, np.sqrt(meat) / np.where(bread > 0, bread, 1.0), np.inf)
     return float(np.median(errors / scales))
 
@@ -56,9 +57,11 @@ def widened(problem: Problem, settling: Settling, descent: Descent, scales: Floa
     than most keeps it.
     """
     best, errors = scales, scales * standard_error(problem, settling.prior, descent.angles, scales)
-    cameras = descent.cameras.copy()
+    cameras, before = descent.cameras.copy(), descent.angles.copy()
     for factor in WIDER:
         wide = np.maximum(scales, factor * np.minimum(scales, np.median(scales)))
+        if np.median(wide) * standard_error(problem, settling.prior, before, wide) > HOPE * np.median(errors):
+            continue
         for _ in range(STEPS):
             descent.step(floored(settling.weights(descent.angles, wide)))
         there = wide * standard_error(problem, settling.prior, descent.angles, wide)

@@ -32,10 +32,10 @@ def noise_scale(half: HalfEdges, m: int) -> float:
 
 
 def support_by_triangles(half: HalfEdges, m: int, scales: Floats) -> Floats:
-    """(k, m) sum over the triangles at each edge of (1 + (a / s)^2)^-2, a being the angle of R_ij R_jl R_li.
+    """(k, m) sum over the triangles at each edge of (1 + (c / s)^2)^-2, where c = 4 sin(a / 4).
 
-    Where there are too many triangles, each edge has as many as the budget allows, those with the cameras of highest
-    rank.
+    a is the angle of R_ij R_jl R_li, and c is the same up to 1 % at 60 degrees, without an arcsine. Where there are too
+    many triangles, each edge has as many as the budget allows, those with the cameras of highest rank.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def support_by_triangles(half: HalfEdges, m: int, scales: Floats) -> Floats:
         (k,) values of s, radians.
     """
     support = np.zeros((m, len(scales)))
-    _visit(half, max(FEWEST, BUDGET // m), scales, support, np.zeros(BINS, dtype=np.int32))
+    _visit(half, max(FEWEST, BUDGET // m), scales, support, np.zeros(0, dtype=np.int32))
     return np.ascontiguousarray(support.T)
 
 
@@ -80,10 +80,11 @@ def _visit_triangles(
     scales, support
         (k,) and (m, k): what triangles that close at each scale add to.
     histogram
-        (b,) what their angles add to, bins of equal width up to pi.
+        (b,) what their angles add to, bins of equal width up to pi; none where b is zero.
     """
     n, bins = len(first) - 1, len(histogram)
-    place = np.full(n, -1)
+    place = np.full(n, -1, dtype=np.int32)
+    inverse, own = 1 / scales**2, np.zeros(len(scales))
     for i in range(n):
         for a in range(first[i], first[i + 1]):
             place[others[a]] = a
@@ -94,6 +95,7 @@ def _visit_triangles(
                 continue
             w, x, y, z = quaternions[a, 0], quaternions[a, 1], quaternions[a, 2], quaternions[a, 3]
             last, count = max(ranks[i], ranks[j]), 0
+            own[:] = 0
             for step in range(first[j + 1] - first[j]):
                 b = first[j + 1] - 1 - step if whole else first[j] + step
                 if whole and ranks[others[b]] < last:
@@ -107,18 +109,21 @@ def _visit_triangles(
                 r = w * f - x * g + y * d + z * e
                 s = w * g + x * f - y * e + z * d
                 d, e, f, g = quaternions[c, 0], quaternions[c, 1], quaternions[c, 2], quaternions[c, 3]
-                sign = 1.0 if p * d + q * e + r * f + s * g >= 0 else -1.0
-                p, q, r, s = p - sign * d, q - sign * e, r - sign * f, s - sign * g
-                angle = 4 * math.asin(min(1.0, math.sqrt(p * p + q * q + r * r + s * s) / 2))
-                histogram[min(int(angle / math.pi * bins), bins - 1)] += 1
+                square = 8 * max(1 - abs(p * d + q * e + r * f + s * g), 0.0)
+                if bins > 0:
+                    angle = 4 * math.asin(math.sqrt(square) / 4)
+                    histogram[min(int(angle / math.pi * bins), bins - 1)] += 1
                 for k in range(len(scales)):
-                    share = 1 / (1 + (angle / scales[k]) ** 2)
-                    support[ids[a], k] += share * share
+                    share = 1 / (1 + square * inverse[k])
+                    share *= share
+                    own[k] += share
                     if whole:
-                        support[ids[b], k] += share * share
-                        support[ids[c], k] += share * share
+                        support[ids[b], k] += share
+                        support[ids[c], k] += share
                 count += 1
                 if count == most and not whole:
                     break
+            for k in range(len(scales)):
+                support[ids[a], k] += own[k]
         for a in range(first[i], first[i + 1]):
             place[others[a]] = -1

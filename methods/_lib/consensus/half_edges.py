@@ -42,7 +42,7 @@ class HalfEdges:
         m = problem.m
         ends, others = np.concatenate([i, j]), np.concatenate([j, i])
         ranks = _ranks(problem)
-        order = np.lexsort((ranks[others], ends))
+        order = np.argsort(ends * np.int64(problem.n) + ranks[others])
         quaternions = np.empty((m, 4))
         edge_kernels.quaternions(problem.rotations, quaternions)
         both = np.concatenate([quaternions, quaternions * [1.0, -1.0, -1.0, -1.0]])
@@ -67,12 +67,24 @@ class HalfEdges:
     @property
     def connected(self) -> bool:
         """Whether every camera can be reached from every other."""
-        from scipy import sparse
-        from scipy.sparse.csgraph import connected_components
+        reached = np.zeros(len(self.first) - 1, dtype=np.bool_)
+        _reach(self.first, self.others, reached)
+        return bool(reached.all())
 
-        n = len(self.first) - 1
-        graph = sparse.csr_array((np.ones(len(self.others), dtype=np.int8), self.others, self.first), shape=(n, n))
-        return bool(connected_components(graph, directed=False)[0] == 1)
+
+@edge_kernels.compiled
+def _reach(first: Ints, others: Ints, reached: NDArray[np.bool_]) -> None:
+    """Mark in `reached` (n,) the cameras that can be reached from the first one."""
+    waiting = np.zeros(len(reached), dtype=np.int32)
+    reached[0], count = True, 1
+    while count > 0:
+        count -= 1
+        camera = waiting[count]
+        for h in range(first[camera], first[camera + 1]):
+            if not reached[others[h]]:
+                reached[others[h]] = True
+                waiting[count] = others[h]
+                count += 1
 
 
 @edge_kernels.compiled

@@ -9,6 +9,7 @@ from ..loops import edge_kernels
 
 FAINT = 0.2  # agreement below which a camera that has still less loses little more
 MOST_PIECES = 50
+MEMBERS, ROUNDS = 100, 5  # of a search for the rotation that most cameras have in common
 DIGITS = 6  # of a judgement; beyond, two are the same, lest rounding decide
 
 
@@ -26,7 +27,7 @@ class Judge:
         The logarithm makes every camera count: one that agrees with nothing costs more than a hundred edges between
         cameras that agree already can bring.
         """
-        agreement = (1 + (angles / self.scale) ** 2) ** -2
+        agreement = 1 / (1 + (angles / self.scale) ** 2) ** 2
         i, j = self.problem.edges.T
         n = self.problem.n
         return round(float(np.log(FAINT + np.bincount(i, agreement, n) + np.bincount(j, agreement, n)).sum()), DIGITS)
@@ -47,7 +48,7 @@ def recombined(judge: Judge, cameras: Floats, other: Floats, apart: float) -> tu
     """
     here, there = so3.from_quaternion(cameras), so3.from_quaternion(other)
     relative = np.swapaxes(here, -1, -2) @ there
-    gauge = so3.geodesic_median(relative)
+    gauge = so3.from_quaternion(_most_common(so3.to_quaternion(relative), apart))
     moved = so3.to_quaternion(there @ gauge.T)
     taken, score, result = 0, judge.of_cameras(cameras), cameras
     for piece in _pieces(judge.problem, relative, gauge, apart)[:MOST_PIECES]:
@@ -56,6 +57,22 @@ def recombined(judge: Judge, cameras: Floats, other: Floats, apart: float) -> tu
         if (better := judge.of_cameras(changed)) > score:
             taken, score, result = taken + 1, better, changed
     return result, taken
+
+
+def _most_common(rotations: Floats, width: float) -> Floats:
+    """Quaternion (4,) of the rotation that most of the `rotations` (n, 4) are near, up to a `width` in radians.
+
+    A mode: the best of some members, moved to the mean of those around it. A median takes twenty times as long.
+    """
+    sine = np.sin(width / 2) ** 2
+    members = rotations[np.unique(np.linspace(0, len(rotations) - 1, MEMBERS).astype(int))]
+    cosines = rotations @ members.T
+    found = members[np.argmax((1 / (1 + (1 - cosines**2) / sine) ** 2).sum(axis=0))]
+    for _ in range(ROUNDS):
+        cosines = rotations @ found
+        found = (np.sign(cosines) / (1 + (1 - cosines**2) / sine) ** 2) @ rotations
+        found = found / np.linalg.norm(found)
+    return np.asarray(found)
 
 
 def _pieces(problem: Problem, relative: Floats, gauge: Floats, apart: float) -> list[NDArray[np.intp]]:

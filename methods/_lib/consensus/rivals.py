@@ -140,7 +140,7 @@ def _votes(
     sine = np.sin(tolerance / 2) ** 2
 
     def support(cosines: Floats) -> Floats:
-        return np.asarray(share * ((1 + np.maximum(1 - cosines**2, 0) / sine) ** -2).sum(axis=0))
+        return np.asarray(share * (1 / (1 + np.maximum(1 - cosines**2, 0) / sine) ** 2).sum(axis=0))
 
     elsewhere = _spread(np.flatnonzero(angles[asked] > APART * tolerance), ASKED)
     return float(support(turns[:, 0])), support(turns @ turns[elsewhere].T), angles[asked][elsewhere]

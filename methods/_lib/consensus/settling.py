@@ -11,8 +11,8 @@ from ..descent.iterate import floored
 from ..loops.edge_kernels import compiled
 from .half_edges import HalfEdges
 
-NARROWEST, WIDEST = np.radians([0.02, 60.0])
-HALVINGS = 10  # of the interval in which a scale is sought, on a logarithmic axis: to one percent
+NARROWEST, WIDEST, FIRST = np.radians([0.02, 60.0, 2.0])  # scales; the first that is tried
+CLOSE, MOST_TRIALS = 0.02, 12  # of the sum that has to be reached, and of scales that are tried for a camera
 SHARE = 0.3  # of the edges at a camera; more need not agree
 FEWEST, MOST = 2.0, 0.6  # but two must, or 60 % of fewer than four edges
 
@@ -30,17 +30,18 @@ class Settling:
         self._edges, self._half = problem.edges, half
         fewest = np.minimum(FEWEST, MOST * problem.degree)
         self._needed = np.maximum(np.minimum(agreeing, SHARE * problem.degree), fewest)
+        self._scales = np.full(problem.n, FIRST)
 
     def scales(self, angles: Floats) -> Floats:
-        """(n,) s_i for residuals (m,), radians."""
-        result = np.empty(len(self._needed))
-        _agreeing_scales(self._half.first, self._half.ids, angles, self._needed, NARROWEST, WIDEST, result)
-        return result
+        """(n,) s_i for residuals (m,), radians; found the faster, the nearer they are to those of the last call."""
+        _agreeing_scales(self._half.first, self._half.ids, angles, self._needed, NARROWEST, WIDEST, self._scales)
+        return self._scales.copy()
 
     def weights(self, angles: Floats, scales: Floats) -> Floats:
         """(m,) weights for residuals (m,) and scales (n,) of the cameras."""
-        wider = wider_scales(self._edges, scales)
-        return self.prior / (wider * (1 + (angles / wider) ** 2)) ** 2
+        result = np.empty(len(angles))
+        _geman_mcclure(self._edges, self.prior, angles, scales, result)
+        return result
 
     def settle(self, descent: Descent, start: float, steps: int) -> Floats:
         """Move the cameras, in `steps`, with scales that fall from `start` to those of the cameras; the scales (n,)."""
@@ -58,19 +59,52 @@ def wider_scales(edges: Ints, scales: Floats) -> Floats:
 
 
 @compiled
+def _geman_mcclure(edges: Ints, prior: Floats, angles: Floats, scales: Floats, weights: Floats) -> None:
+    """Fill `weights` (m,), see `Settling`."""
+    for e in range(len(edges)):
+        scale = max(scales[edges[e, 0]], scales[edges[e, 1]])
+        share = scale / (scale * scale + angles[e] * angles[e])
+        weights[e] = prior[e] * share * share
+
+
+@compiled
 def _agreeing_scales(
     first: Ints, ids: Ints, angles: Floats, needed: Floats, narrowest: float, widest: float, scales: Floats
 ) -> None:
-    """Fill `scales` (n,), see `Settling`; `needed` (n,) is what the sum has to reach, in vain at `widest`."""
+    """Make `scales` (n,) those of `Settling`, from where they are, by Newton's method between bounds.
+
+    On logarithmic axes, where the sum of (1 + (r / s)^2)^-2 over the edges of a camera is nearly a line.
+
+    Parameters
+    ----------
+    first, ids
+        See `HalfEdges`.
+    angles
+        (m,) residuals r.
+    needed
+        (n,) what the sum has to reach, up to a factor `CLOSE`; in vain at `widest`.
+    """
+    squares = np.empty(np.diff(first).max())
     for i in range(len(first) - 1):
-        low, high = narrowest, widest
-        for _ in range(HALVINGS):
-            middle, total = math.sqrt(low * high), 0.0
-            for h in range(first[i], first[i + 1]):
-                share = 1 / (1 + (angles[ids[h]] / middle) ** 2)
+        degree = first[i + 1] - first[i]
+        for h in range(degree):
+            squares[h] = angles[ids[first[i] + h]] ** 2
+        low, high, scale = math.log(narrowest), math.log(widest), math.log(scales[i])
+        for _ in range(MOST_TRIALS):
+            inverse, total, slope = math.exp(-2 * scale), 0.0, 0.0
+            for h in range(degree):
+                share = 1 / (1 + squares[h] * inverse)
                 total += share * share
+                slope += share * share * (1 - share)
+            if abs(total - needed[i]) < CLOSE * needed[i]:
+                break
             if total < needed[i]:
-                low = middle
+                low = scale
             else:
-                high = middle
-        scales[i] = high
+                high = scale
+            if high - low < CLOSE / 4:
+                scale = high
+                break
+            moved = scale + math.log(needed[i] / total) * total / (4 * slope) if total > 0 and slope > 0 else low
+            scale = moved if low < moved < high else (low + high) / 2
+        scales[i] = math.exp(scale)

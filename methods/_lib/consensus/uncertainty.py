@@ -56,7 +56,7 @@ def camera_sigma(
     wider = wider_scales(problem.edges, scales)
     chance = correlation(problem, descent.vectors, descent.angles, wider)
     near = np.minimum(alone ** (1 - chance) * np.maximum(alone, common) ** chance, np.pi)
-    agreement = (1 + (descent.angles / wider) ** 2) ** -2
+    agreement = 1 / (1 + (descent.angles / wider) ** 2) ** 2
     probable, possible = rival_places(problem, descent.vectors, descent.angles, agreement, noise, descent.inverse)
     near = np.maximum(near, np.where(probable > 0, probable + near, 0))
     return np.minimum(np.maximum(near, np.where(possible > 0, possible / 2 + near, 0)), np.pi)
