@@ -25,7 +25,7 @@ START_DEG, START = (
     8.0,
     4.0,
 )  # where the scales of the cameras begin to fall; the larger of these degrees and noise scales
-STEPS, LAST_STEPS = 12, 12  # of least squares, for each solution that was grown and for the final one
+STEPS = 12  # of least squares, for each solution that was grown and for the final one
 TOGETHER_DEG = 2.0  # where the scales of the final one begin
 JUDGED, APART = 0.5, 4.0  # noise scales at which solutions are compared, and by which they stand elsewhere
 
@@ -85,7 +85,7 @@ class Consensus(Warm):
             cameras, taken = recombined(judge, cameras, other.cameras, APART * noise)
             pieces += taken
         final = Descent(problem, so3.from_quaternion(cameras), 0.0)
-        narrow = settling.settle(final, np.radians(TOGETHER_DEG), LAST_STEPS)
+        narrow = settling.settle(final, np.radians(TOGETHER_DEG), STEPS)
         scales, errors = widened(problem, settling, final, narrow)
         weights = settling.weights(final.angles, scales)
         taken_over = f"; {pieces} piece{'s' * (pieces > 1)} of others taken over" if pieces else ""

@@ -61,7 +61,7 @@ def widened(problem: Problem, settling: Settling, descent: Descent, scales: Floa
     for factor in WIDER:
         wide = np.maximum(scales, factor * np.minimum(scales, np.median(scales)))
         if np.median(wide) * standard_error(problem, settling.prior, before, wide) > HOPE * np.median(errors):
-            continue
+            break
         for _ in range(STEPS):
             descent.step(floored(settling.weights(descent.angles, wide)))
         there = wide * standard_error(problem, settling.prior, descent.angles, wide)
