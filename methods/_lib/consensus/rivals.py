@@ -12,6 +12,7 @@ from .propagation import Inverse, strengths
 Piece = NDArray[np.bool_]
 VECTORS, COLUMNS, ROUNDS = 3, 6, 4  # smooth functions on the graph; columns and rounds of the iteration that finds them
 FAINT = 1e-3  # agreement of an edge at least, so that the graph stays connected
+LARGE = 200_000  # edges, from which on pieces are not sought: the smooth functions would take longer than the solution
 WEAKEST = 0.3  # conductance; pieces that are bound more closely than that are not looked at
 NARROWEST, WIDEST = np.radians([3.0, 10.0])  # within which two measurements ask for the same place
 TOLERANCE, APART = 2.0, 3.0  # that angle in noise scales, and the angle of another place in such angles
@@ -37,10 +38,10 @@ def rival_places(
 
     Pieces are sought where few measurements agree across: on both sides of the weakest cuts along each of the three
     smoothest functions on the graph of agreement (Shi and Malik 2000). Of the measurements across, a agree with the
-    solution and b with the turn of the whole piece that most others ask for. That turn is the right one with
+    solution and b with a turn of the whole piece that one of the others asks for. That turn is the right one with
     odds ((b - 1 + d) / (a - 1 + d))^2, d = 0.25: the first measurement agrees with itself. Where a is small, the
     piece, or a single camera, may as well stand anywhere: chance u (d / (a - 1 + d))^2, u being the share of all
-    measurements that ask for another place.
+    measurements that ask for another place. Pieces of graphs with 200,000 edges or more are not sought.
 
     Parameters
     ----------
@@ -66,7 +67,8 @@ def rival_places(
             farthest = turned[chances > least].max(initial=0.0)
             radius[cameras] = np.maximum(radius[cameras], farthest)
 
-    for piece in _pieces(problem, together, _smoothest(problem, together, inverse(together))):
+    smooth = _smoothest(problem, together, inverse(together)) if problem.m < LARGE else np.zeros((problem.n, 0))
+    for piece in _pieces(problem, together, smooth):
         votes, rivals, turned = _votes(problem, vectors, angles, piece, tolerance)
         odds = ((np.maximum(rivals - 1, 0) + DOUBT) / (max(votes - 1, 0) + DOUBT)) ** 2
         consider(piece, odds / (1 + odds), turned)
