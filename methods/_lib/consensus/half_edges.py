@@ -59,9 +59,11 @@ class HalfEdges:
             return self
         among = np.zeros(len(weights), dtype=np.bool_)
         _mark_strongest(self.first, self.ids, weights, most, among)
-        kept = among[self.ids]
-        first = np.concatenate([[0], np.cumsum(kept)])[self.first].astype(np.int32)
-        found = HalfEdges(self.ranks, first, self.others[kept], self.ids[kept], self.quaternions[kept])
+        kept = np.flatnonzero(among[self.ids])
+        first = np.searchsorted(kept, self.first).astype(np.int32)
+        found = HalfEdges(
+            self.ranks, first, self.others.take(kept), self.ids.take(kept), self.quaternions.take(kept, axis=0)
+        )
         return found if found.connected else self
 
     @property
