@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from bench.plugins.declare import dataset as dataset
     from bench.plugins.declare import method as method
 
-__version__ = "0.2.0.dev0"
+__version__ = "0.2.0"
 
 # Where each name of the door lives.
 HOMES = {

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from commands import bench
 
+import bench as door
 from bench.core.errors import InputError
 from bench.plugins.catalog import catalog
 from bench.plugins.references import BENCHMARK, SUITE, bibliography, cite_keys, read_entries, references
@@ -68,7 +69,7 @@ def test_the_command(faulty_plugin: Path, tmp_path: Path) -> None:
     plugin.write_text(faulty_plugin.read_text().replace('title="Faulty"', 'title="Faulty", cite="me2026"'))
     plugin.with_name("references.bib").write_text("@misc{me2026,\n  title = {Mine},\n}\n")
     run = tmp_path / "run"
-    bench("run", "--plugin", plugin, "-m", "faulty", "-m", "l1-irls", "-d", "toy", "--out", run)
+    door.run(methods=["faulty", "l1-irls"], datasets=["toy"], plugins=(plugin,), out=run)
     done = bench("bibtex", run)
     (tmp_path / "found.bib").write_text(done.stdout)
     assert list(read_entries(tmp_path / "found.bib")) == ["rotsync-bench", "tejus2023", "me2026", "chatterjee2018"]

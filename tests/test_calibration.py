@@ -8,6 +8,7 @@ import pytest
 from commands import bench
 from scenes import write_scene
 
+import bench as door
 from bench.core import so3
 from bench.core.errors import InputError
 from bench.core.problem import Floats, Instance, Problem
@@ -81,9 +82,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("calibration")
     write_scene(folder / "data" / "Square", images=14)
     of = "twin[of='1dsfm[scene=Square]',errors=[correlated,independent]]"
-    datasets = [word for text in ("1dsfm[scene=Square]", of, "erdos-renyi[n=20]") for word in ("-d", text)]
-    methods = [word for text in METHODS for word in ("-m", text)]
-    bench("run", *datasets, *methods, "--seeds", "2", "--data-dir", folder / "data", "--out", folder / "run")
+    datasets = ["1dsfm[scene=Square]", of, "erdos-renyi[n=20]"]
+    door.run(methods=METHODS, datasets=datasets, seeds=2, data_dir=folder / "data", out=folder / "run")
     return folder / "run"
 
 
@@ -134,6 +134,6 @@ def test_a_run_without_real_or_without_simulated_graphs_is_refused(tmp_path: Pat
     made_run(tmp_path / "real", ["A"], [Made("a")])
     done = bench("calibrate", tmp_path / "real", code=2)
     assert "has no simulated graph with ground truth" in done.stderr
-    bench("run", "-m", "spectral", "-d", "erdos-renyi[n=10]", "--out", tmp_path / "simulated")
+    door.run(methods=["spectral"], datasets=["erdos-renyi[n=10]"], out=tmp_path / "simulated")
     done = bench("calibrate", tmp_path / "simulated", code=2)
     assert "has no measured graph with ground truth" in done.stderr

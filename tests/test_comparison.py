@@ -79,7 +79,7 @@ def test_worse_better_and_neither(scenes: int) -> None:
     old = scored({"a": 1.0, "b": 1.0, "c": 1.0, "d": 1.0}, scenes)
     new = scored({"a": 1.5, "b": 0.6, "c": 1.001, "d": 1.0}, scenes)
     found = compare(old, new)
-    assert verdicts(found) == {"a": {"worse"}, "b": {"better"}, "c": {"cannot be told"}, "d": {"identical"}}
+    assert verdicts(found) == {"a": {"worse"}, "b": {"better"}, "c": {"cannot tell"}, "d": {"identical"}}
     assert found.regressed
     rows = found.rows.set_index(["level", "method", "quantity"])
     row = rows.loc[("method", "a", "median")]
@@ -122,7 +122,7 @@ def test_seeds_with_an_instance_each_are_a_t_test() -> None:
 
 def test_the_threshold_says_what_is_no_regression() -> None:
     found = compare(scored({"a": 1.0}, 8), scored({"a": 1.2}, 8), threshold=1.5)
-    assert verdicts(found) == {"a": {"cannot be told"}}
+    assert verdicts(found) == {"a": {"cannot tell"}}
     assert not found.regressed
     assert compare(scored({"a": 1.0}, 8), scored({"a": 1.2}, 8), threshold=1.1).regressed
 
@@ -131,7 +131,7 @@ def test_one_bad_scene_of_many_is_a_regression() -> None:
     old, new = scored({"a": 1.0}, 5), scored({"a": 1.0}, 5)
     new.job_errors["3-a-0"] = 3 * old.job_errors["3-a-0"]  # type: ignore[index]
     found = compare(old, new)
-    assert verdicts(found) == {"a": {"cannot be told"}}
+    assert verdicts(found) == {"a": {"cannot tell"}}
     told = found.rows[(found.rows["level"] == "scene") & (found.rows["verdict"] == "worse")]
     assert set(told["instance"]) == {"s3"}
     assert found.regressed

@@ -219,6 +219,12 @@ def arguments(plugin: Path, out: Path, *faults: str) -> list[str]:
     return ["run", "--plugin", str(plugin), *methods, "-d", "toy", "--seeds", "4", "--jobs", "2", "--out", str(out)]
 
 
+def run_quietly(plugin: Path, out: Path, *faults: str, **options: Any) -> None:
+    """The same without a console, tables and plots."""
+    methods = [f"faulty[fault={fault}]" for fault in faults]
+    door.run(methods=methods, datasets=["toy"], seeds=4, jobs=2, plugins=(plugin,), out=out, **options)
+
+
 def test_without_a_terminal_there_is_a_line_for_each_job_and_no_escape(faulty_plugin: Path, tmp_path: Path) -> None:
     done = bench(*arguments(faulty_plugin, tmp_path / "run", "fine", "raise"))
     assert len(re.findall(r"^ *\d/8  toy5 .*", done.stdout, re.MULTILINE)) == 8
@@ -228,7 +234,7 @@ def test_without_a_terminal_there_is_a_line_for_each_job_and_no_escape(faulty_pl
 def test_a_dry_run_tells_how_long_it_takes(faulty_plugin: Path, tmp_path: Path) -> None:
     first = bench(*arguments(faulty_plugin, tmp_path / "a", "slow"), "--dry-run")
     assert "time: unknown, for there is no earlier record" in first.stdout
-    bench(*arguments(faulty_plugin, tmp_path / "a", "slow"))
+    run_quietly(faulty_plugin, tmp_path / "a", "slow")
     beside = bench(*arguments(faulty_plugin, tmp_path / "b", "slow"), "--dry-run")
     found = re.search(r"time: about (\d+) s, 2 at a time, going by 4 earlier records$", beside.stdout, re.MULTILINE)
     assert found is not None
@@ -299,8 +305,8 @@ def test_of_earlier_runs_every_method_is_read_and_no_timing_run(faulty_plugin: P
     from bench.running.run import Options, Run
 
     faults = ("fine", "raise", "skip", "slow")
-    bench(*arguments(faulty_plugin, tmp_path / "a", *faults))
-    bench(*arguments(faulty_plugin, tmp_path / "timed", "fine"), "--timing", "--rounds", 2)
+    run_quietly(faulty_plugin, tmp_path / "a", *faults)
+    run_quietly(faulty_plugin, tmp_path / "timed", "fine", timing=True, rounds=2)
     methods = [f"faulty[fault={fault}]" for fault in faults]
     planned = Run(None, methods, ["toy"], Options(out=tmp_path / "b", seeds=6, plugins=(faulty_plugin,)))
     past = Past(planned)

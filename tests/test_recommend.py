@@ -121,7 +121,7 @@ def test_a_graph_without_triangles_is_told_that_its_twins_are_not_to_be_trusted(
     )
     assert "twins are not to be trusted" in told
     assert "not to be trusted" in twins_grid(asked).caption
-    assert "cannot be foretold" in told
+    assert "cannot be predicted" in told
     assert "Error to expect" not in told
 
 

@@ -112,8 +112,8 @@ def test_the_verdict_claims_no_more_than_the_interval_shows() -> None:
             ],
         )
     )
-    assert [row.verdict for row in rows] == ["", "better", "cannot be told", "worse"]
-    assert verdict(rows) == "on held-out graphs better than far, not to be told from near, worse than best"
+    assert [row.verdict for row in rows] == ["", "better", "cannot tell", "worse"]
+    assert verdict(rows) == "on held-out graphs better than far, not told apart from near, worse than best"
 
 
 @pytest.mark.usefixtures("trained")

@@ -87,7 +87,7 @@ def _by_evidence(of: Recommendation, found: Evidence) -> str:
     return (
         f"By what is known of {counted(found.graphs, 'real graph')} {kind} ({', '.join(found.collections)}), where its "
         f"median error was {degrees(one.median.middle)} degrees ({_range(one.median)}): no method is safe on them, and "
-        f"the error on this one cannot be foretold. Time: {seconds(took)} s."
+        f"the error on this one cannot be predicted. Time: {seconds(took)} s."
     )
 
 

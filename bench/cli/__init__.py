@@ -57,7 +57,7 @@ def _say_version(wanted: bool) -> None:
 @app.callback()
 def bench(
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=_say_version, help="Say which version this is.")
+        bool, typer.Option("--version", is_eager=True, callback=_say_version, help="Print the version.")
     ] = False,
 ) -> None:
     """Compare rotation synchronization (multiple rotation averaging) methods."""

@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 def bibtex(
     run: Annotated[
         Path | None,
-        typer.Argument(metavar="[RUN]", help="Folder of a run, or its name; without, the benchmark alone."),
+        typer.Argument(metavar="[RUN]", help="Folder of a run, or its name; without it, the benchmark alone."),
     ] = None,
 ) -> None:
     """Print the BibTeX entries of the benchmark, of the paper it starts from, and of the methods and datasets of a run.
 
-    What has none is said on standard error.
+    What has no entry is named on standard error.
     """
     from bench.plugins.references import bibliography, cite_keys
     from bench.storage.store import Store

@@ -19,8 +19,8 @@ def calibrate(
 ) -> None:
     """Compare the simulated graphs of RUN with its real ones: errors, triangles, and how methods rank.
 
-    Simulated graphs are those whose outliers are known. One is compared with the real graph that its name begins with;
-    where a dataset has no such names, all of it with every real graph.
+    Simulated graphs are those whose outliers are known. Each is compared with the real graph whose name
+    its own begins with; a dataset without such names is compared as a whole with every real graph.
 
     Example: run -d '1dsfm[scene=Ellis_Island]' -d "twin[of='1dsfm[scene=Ellis_Island]']" -m ... --out RUN, then this.
     """

@@ -31,7 +31,7 @@ def compare(
         ),
     ],
     methods: Annotated[
-        bool, typer.Option("--methods", help="Compare methods of one run; of one alone, with all others.")
+        bool, typer.Option("--methods", help="Compare methods of one run; a single one, with all others.")
     ] = False,
     align: AlignOption = Align.L1,
     protocol: ProtocolOption = None,

@@ -11,12 +11,12 @@ from bench.core.words import counted
 def doctor(
     run: RunFolder,
     repair: Annotated[
-        bool, typer.Option("--repair", help="Move what is damaged to RUN/damaged, and remove what serves nothing.")
+        bool, typer.Option("--repair", help="Move what is damaged to RUN/damaged, and remove what is of no use.")
     ] = False,
 ) -> None:
     """Examine the folder of a run; exit code 1 where something was found and is not repaired.
 
-    After --repair, the command that made the run makes again what was damaged.
+    After --repair, the command that made the run redoes what was damaged.
     """
     from bench.core import outcome
     from bench.core.program import program

@@ -17,9 +17,9 @@ def export(
     align: AlignOption = Align.L1,
     protocol: ProtocolOption = None,
 ) -> None:
-    """Write the scores of a run, where they come from and its records: what `site` reads, and a pull request brings.
+    """Write the scores of a run, where they come from and its records: what `site` reads and a pull request adds.
 
-    Estimates and instances stay in the run, and so does the name of the machine.
+    Estimates, instances and the name of the machine are left out.
     """
     from bench.scoring.results import score
     from bench.site.export import export as exported

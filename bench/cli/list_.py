@@ -13,9 +13,7 @@ What = StrEnum("What", ["METHODS", "DATASETS", "SUITES", "PAPERS"])  # that can 
 
 def list_(
     what: Annotated[What, typer.Argument()],
-    name: Annotated[
-        str, typer.Argument(metavar="[NAME]", help="Say everything of this method or dataset instead.")
-    ] = "",
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Describe this method or dataset instead.")] = "",
     plugin: PluginOption = None,
 ) -> None:
     """List methods, datasets, suites or papers; broken plug-ins are listed with the reason."""

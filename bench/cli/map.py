@@ -12,12 +12,12 @@ NAME = "map"
 
 
 def map_(
-    method: Annotated[list[str], typer.Option("--method", "-m", metavar="M", help="Repeat for more.")],
-    dataset: Annotated[str, typer.Option("--dataset", "-d", metavar="D", help="What stays the same.")],
+    method: Annotated[list[str], typer.Option("--method", "-m", metavar="M", help="Repeatable.")],
+    dataset: Annotated[str, typer.Option("--dataset", "-d", metavar="D", help="Its other parameters stay the same.")],
     x: Annotated[str, typer.Option("--x", metavar="AXIS", help="NAME=FROM:TO[:log], a parameter of the dataset.")],
     y: Annotated[str, typer.Option("--y", metavar="AXIS", help="The same, another parameter.")],
-    cells: Annotated[str, typer.Option(metavar="N", help="Cells a side, or along x and y: 16x12.")] = "12",
-    seeds: Annotated[int, typer.Option(metavar="N", help="Samples of a cell at most; the majority counts.")] = 3,
+    cells: Annotated[str, typer.Option(metavar="N", help="Cells per side, or along x and y: 16x12.")] = "12",
+    seeds: Annotated[int, typer.Option(metavar="N", help="Samples per cell, at most; the majority counts.")] = 3,
     success: Annotated[
         str,
         typer.Option(
@@ -38,8 +38,8 @@ def map_(
     """Map where methods break down, solving mostly along the boundary.
 
     A coarse lattice first; then cells between neighbours that disagree, and further seeds where the outcome is
-    unsure. What is stored is not solved again: after Ctrl-C, the same command continues. An `n` and a `noise_deg`
-    make an axis as well as `missing` and `outliers`.
+    unsure. What is stored is not solved again: after Ctrl-C, the same command continues. `n` and `noise_deg` can
+    be axes as well as `missing` and `outliers`.
 
     Example: -m l1-irls -d 'erdos-renyi[n=50]' --x missing=0:0.9 --y outliers=0:0.9
     """

@@ -10,7 +10,7 @@ def merge(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs; they stay as they are.")],
     into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder that gets everything; new or a run.")],
 ) -> None:
-    """Merge runs: nothing finished is lost, and what both have is there once.
+    """Merge runs: nothing finished is lost, and what several have is kept once.
 
     What cannot be read is named and left out; the command that made the run then runs it again.
     """

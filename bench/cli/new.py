@@ -89,7 +89,7 @@ def new(
     name: Annotated[str, typer.Argument(help="Lower case words joined by hyphens.")],
     into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder for the file.")] = Path(),
 ) -> None:
-    """Write a working method or dataset of one file, to be replaced by yours."""
+    """Write a working method or dataset in one file, as a start for yours."""
     from bench.core.errors import InputError
     from bench.core.program import program
 

@@ -33,10 +33,10 @@ class Engine(StrEnum):
 
 
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or its name under results/runs.")]
-AlignOption = Annotated[Align, typer.Option("--align", help="Rule that removes the gauge; re-scores, runs nothing.")]
+AlignOption = Annotated[Align, typer.Option("--align", help="Rule that removes the gauge; re-scores without running.")]
 ProtocolOption = Annotated[
     str | None,
-    typer.Option("--protocol", metavar="P", help="Which cameras are solved and scored, where data give the choice."),
+    typer.Option("--protocol", metavar="P", help="Which cameras are solved and scored, where data give a choice."),
 ]
 PluginOption = Annotated[
     list[Path] | None,
@@ -47,7 +47,7 @@ UseOption = Annotated[
     typer.Option(
         "--use",
         metavar="WHAT",
-        help="Of what comes with the measurements: weights,precisions,gravity or none.  [default: what a method can]",
+        help="What to use besides rotations: weights,precisions,gravity or none.  [default: all a method can]",
     ),
 ]
 WeightsOption = Annotated[
@@ -60,7 +60,9 @@ DataDirOption = Annotated[
 StyleOption = Annotated[
     Path | None,
     typer.Option(
-        "--style", metavar="FILE", help="TOML file of fonts, colours and names.  [default: bench-style.toml, if there]"
+        "--style",
+        metavar="FILE",
+        help="TOML file of fonts, colours and names.  [default: bench-style.toml, if present]",
     ),
 ]
 

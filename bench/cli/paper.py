@@ -25,19 +25,21 @@ def paper(
     ] = None,
     method: Annotated[
         list[str] | None,
-        typer.Option("--method", "-m", metavar="M", help="A method of yours beside the paper's. Repeats."),
+        typer.Option("--method", "-m", metavar="M", help="A method of yours beside the paper's. Repeatable."),
     ] = None,
     plugin: PluginOption = None,
     explain: Annotated[
         list[str] | None,
-        typer.Option("--explain", metavar="CELL", help="Which single switch closes the gap of SCENE/COLUMN? Repeats."),
+        typer.Option(
+            "--explain", metavar="CELL", help="Which single switch closes the gap of SCENE/COLUMN? Repeatable."
+        ),
     ] = None,
     align: Annotated[
         Align | None, typer.Option(help="Rule that removes the gauge; re-scores.  [default: the paper's]")
     ] = None,
     seeds: Annotated[int | None, typer.Option(metavar="N", help="Seeds 0 to N-1 of what is computed.")] = None,
     jobs: Annotated[int | None, typer.Option(metavar="N", help="Jobs at a time.  [default: one a core]")] = None,
-    compute: Annotated[bool, typer.Option("--compute", help="Compute also what takes hours and is recorded.")] = False,
+    compute: Annotated[bool, typer.Option("--compute", help="Also compute what takes hours and is recorded.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run, and run nothing.")] = False,
     format: Format = Format.CONSOLE,
     style: StyleOption = None,

@@ -17,7 +17,7 @@ def recommend(
     method: Annotated[
         list[str] | None,
         typer.Option(
-            "--method", "-m", metavar="M", help="A candidate in place of the suite's; twins decide.  Repeats."
+            "--method", "-m", metavar="M", help="A candidate in place of the suite's; twins decide.  Repeatable."
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Keep the run on the twins, for `table`.")] = None,

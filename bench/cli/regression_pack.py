@@ -21,7 +21,7 @@ def regression_pack(
     method: Annotated[
         list[str] | None,
         typer.Option(
-            "--method", "-m", metavar="M", help="In place of the suite's; its package must be there. Repeats."
+            "--method", "-m", metavar="M", help="In place of the suite's; its package must be there. Repeatable."
         ),
     ] = None,
     plugin: PluginOption = None,

@@ -23,7 +23,7 @@ def rerun(
 ) -> None:
     """Repeat the job of a record, with its instance, parameters, seed, limits and threads; nothing is stored.
 
-    What is no longer as it was (instance, source of the method, versions) is said. The exit code is 1 when the job
+    What has changed since (instance, source of the method, versions) is reported. The exit code is 1 when the job
     ends differently, or with an estimate that is not bit-identical to the one in the record's run.
     """
     from bench.running.replay import prepare

@@ -38,13 +38,16 @@ def run(
             "--method",
             "-m",
             metavar="M",
-            help="In place of the suite's; a bare name is the default configuration. Repeats.",
+            help="In place of the suite's; a bare name is the default configuration. Repeatable.",
         ),
     ] = None,
     dataset: Annotated[
         list[str] | None,
         typer.Option(
-            "--dataset", "-d", metavar="D", help="Only these; a bare name keeps the suite's selections of it. Repeats."
+            "--dataset",
+            "-d",
+            metavar="D",
+            help="Only these; a bare name keeps the suite's selections of it. Repeatable.",
         ),
     ] = None,
     out: Annotated[
@@ -78,7 +81,9 @@ def run(
     ] = Engine.LOCAL,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="Of a dask scheduler, tcp://…  [default: a cluster on this machine]"),
+        typer.Option(
+            metavar="ADDRESS", help="Address of a dask scheduler, tcp://…  [default: a cluster on this machine]"
+        ),
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would run, and run nothing.")] = False,
     plugin: PluginOption = None,
@@ -88,7 +93,7 @@ def run(
 
     What is done and unchanged is not run again: after Ctrl-C, the same command continues.
 
-    With --timing, the jobs are timed instead: the table has median and least solve time and the ratio to the
+    With --timing, the jobs are timed instead: the table has the median and least solve times and the ratio to the
     baseline of the suite (by default its first method).
 
     Example: --suite 1dsfm --data-dir DIR

@@ -10,10 +10,12 @@ from bench.cli.options import Align, AlignOption
 
 def score(
     estimate: Annotated[Path, typer.Argument(help="Absolute rotations; see `data formats`.")],
-    truth: Annotated[Path, typer.Argument(help="The same, of any format; cameras are matched by name, else by id.")],
+    truth: Annotated[
+        Path, typer.Argument(help="The true ones, in any format; cameras are matched by name, else by id.")
+    ],
     align: AlignOption = Align.L1,
 ) -> None:
-    """Score an estimate against the truth, whatever made it, the gauge removed."""
+    """Score an estimate, whatever made it, against the truth, with the gauge removed."""
     import numpy as np
 
     from bench.core.errors import InputError

@@ -15,11 +15,11 @@ def site(
     ],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the site, replaced.")] = Path("site"),
     title: Annotated[
-        str, typer.Option(metavar="TEXT", help="Of the leaderboard.")
+        str, typer.Option(metavar="TEXT", help="Title of the leaderboard.")
     ] = "Rotation synchronization: leaderboard",
     align: AlignOption = Align.L1,
 ) -> None:
-    """Write a leaderboard as a folder of pages: suites, filters, history by version, a page a method.
+    """Write a leaderboard as a folder of pages: suites, filters, history by version, a page for each method.
 
     Every number leads to the command that made it. The pages load nothing from the network: open them from disk, or
     put the folder on any web server.

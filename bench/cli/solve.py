@@ -14,9 +14,12 @@ if TYPE_CHECKING:
 
 def solve(
     graph: Annotated[Path, typer.Argument(help="A file or folder; what is read is listed by `data formats`.")],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="For the absolute rotations; see there.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help="File for the absolute rotations; see `data formats`.")
+    ],
     method: Annotated[
-        str | None, typer.Option("--method", "-m", help="A selection, such as 'name[parameter=3]'.  [default: robust]")
+        str | None,
+        typer.Option("--method", "-m", help="A selection, such as 'name[parameter=3]'.  [default: a robust one]"),
     ] = None,
     seed: Annotated[int, typer.Option()] = 0,
     timeout: Annotated[float, typer.Option(metavar="SECONDS")] = 3600,

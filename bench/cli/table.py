@@ -30,7 +30,7 @@ def table(
     by: Annotated[
         By | None,
         typer.Option(
-            help="A table of every scene, or of means over collections.  [default: collection where one has several]"
+            help="A table of every scene, or of means over collections.  [default: collection, where one has several]"
         ),
     ] = None,
     format: Format = Format.CONSOLE,

@@ -13,22 +13,22 @@ def train(
     method: Annotated[str, typer.Argument(metavar="METHOD", help="One that learns; `list methods` says which.")],
     seed: Annotated[int, typer.Option(min=0, help="Of the graphs, the first weights and the order.")] = 0,
     cpu_minutes: Annotated[
-        float | None, typer.Option(min=0, metavar="M", help="End after so much of the processor.  [default: 20]")
+        float | None, typer.Option(min=0, metavar="M", help="Stop after this much processor time.  [default: 20]")
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="End after so many steps: the same weights every time.")
+        int | None, typer.Option(min=0, metavar="N", help="Stop after this many steps: the same weights every time.")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="For weights, curve and state.  [default: results/runs/train-…]")
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the training in that folder.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the training in that folder.")] = False,
     topologies: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Graphs whose cameras and edges are simulated on, as 1DSfM or .npz."),
     ] = None,
     dataset: Annotated[
         list[str] | None,
-        typer.Option("--dataset", "-d", metavar="D", help="Learn from these instead of the method's.  Repeats."),
+        typer.Option("--dataset", "-d", metavar="D", help="Learn from these instead of the method's.  Repeatable."),
     ] = None,
     graphs: Annotated[int, typer.Option(min=1, metavar="N", help="Graphs to learn from.")] = 300,
     held_out: Annotated[int, typer.Option(min=2, metavar="N", help="Graphs to judge by.")] = 24,
@@ -36,8 +36,8 @@ def train(
 ) -> None:
     """Train a method on simulated graphs, and judge it on others.
 
-    Written are the weights with where they come from, which `--weights` of `run` and `solve` takes; the learning curve;
-    what `--resume` needs; and a table of the trained method beside classical ones on graphs that it has not seen.
+    Writes the weights and where they come from, for `--weights` of `run` and `solve`; the learning curve; what
+    `--resume` needs; and a table of the trained method beside classical ones on graphs that it has not seen.
 
     Example: METHOD --cpu-minutes 120 --topologies DIR
     """

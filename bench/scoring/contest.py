@@ -1,4 +1,4 @@
-"""One method of a run against others of the same run: who wins on each scene and over all, and what cannot be told."""
+"""One method of a run against others of the same run: who wins on each scene and over all, and what nobody can tell."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ WIN: Standing = "win"
 TIE: Standing = "tie"
 LOSS: Standing = "loss"
 OVERALL, SCENE = "overall", "scene"
-WORDS: Mapping[str, Standing] = {"better": WIN, "worse": LOSS, "cannot be told": TIE, IDENTICAL: TIE}
+WORDS: Mapping[str, Standing] = {"better": WIN, "worse": LOSS, "cannot tell": TIE, IDENTICAL: TIE}
 COLUMNS = (
     *("level", "dataset", "instance", "protocol", "method", "params", "quantity"),
     *("own", "other", "ratio", "low", "high", "p_value", "p_holm", "verdict", "wins", "ties", "losses", "why"),

@@ -86,7 +86,7 @@ def standings(trained: Judged, others: Sequence[Judged]) -> list[Standing]:
 
 def verdict(rows: Sequence[Standing]) -> str:
     """What may be said of the weights, in one sentence: no more than the held-out graphs show."""
-    told = {"better": "better than", "worse": "worse than", "cannot be told": "not to be told from"}
+    told = {"better": "better than", "worse": "worse than", "cannot tell": "not told apart from"}
     return f"on held-out graphs {', '.join(f'{told[row.verdict]} {row.label}' for row in rows if row.ratio)}"
 
 

@@ -16,7 +16,7 @@ HEADS = ("first", "second", "ratio", "95 % interval", "p", "verdict")
 
 
 def comparison_grid(found: Comparison, alignment: str, threshold: float) -> Grid:
-    """All methods, each method, and the scenes on which something can be told; worse is bold.
+    """All methods, each method, and the scenes on which the runs can be told apart; worse is bold.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def _label(row: "object") -> str:
 def _legend(found: Comparison, threshold: float) -> Iterator[str]:
     yield (
         "Ratio: second run to first, geometric mean over problems, above 1 is worse; p after Holm's correction. Better "
-        f"or worse: p < 0.05 and a ratio beyond {threshold:g}. Single scenes are listed where they can be told."
+        f"or worse: p < 0.05 and a ratio beyond {threshold:g}. Single scenes are listed where runs can be told apart."
     )
     same = found.rows[(found.rows["level"] == "method") & (found.rows["verdict"] == IDENTICAL)]
     if len(same):

@@ -24,7 +24,7 @@ from bench.scoring.inference.resampling import (
 )
 from bench.scoring.inference.statistics import MIN_CAMERAS
 
-Verdict = Literal["better", "worse", "cannot be told"]
+Verdict = Literal["better", "worse", "cannot tell"]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Ratio:
             A ratio between 1 / threshold and threshold is neither better nor worse.
         """
         if not p_value < LEVEL or 1 / threshold <= self.value <= threshold:
-            return "cannot be told"
+            return "cannot tell"
         return "worse" if self.value > 1 else "better"
 
 
