@@ -56,7 +56,7 @@ class NeuRoRA(Learned):
         Of FineNet; 0 returns the tree.
     """
 
-    passes: int = parameter(4, at_least=0)
+    passes: int = parameter(8, at_least=0)
 
     learns_from: ClassVar[tuple[str, ...]] = (
         "neurora-graphs[fewest=60,most=200]",

@@ -172,15 +172,13 @@ def test_the_loss_falls_and_steps_alone_decide_the_weights() -> None:
 
 
 def test_a_trainer_goes_on_where_another_ended() -> None:
-    graphs, rng = [learned_from(seed) for seed in range(2)], np.random.default_rng(0)
+    graphs = [learned_from(seed) for seed in range(2)]
     whole, half, rest = (NeuRoRA().trainer(seed) for seed in (0, 0, 1))
-    for _ in range(4):
-        whole.step(graphs, rng)
-    for _ in range(2):
-        half.step(graphs, rng)
-    rest.restore(half.state())
-    for _ in range(2):
-        rest.step(graphs, rng)
+    for trainer, steps in ((whole, range(4)), (half, range(2)), (rest, range(2, 4))):
+        if trainer is rest:
+            rest.restore(half.state())
+        for step in steps:
+            trainer.step(graphs, np.random.default_rng(step))
     assert all(np.array_equal(array, rest.weights()[name]) for name, array in whole.weights().items())
 
 

@@ -4,9 +4,9 @@ Theirs are trained one after the other, for thousands of epochs; here every step
 any time: CleanNet, and FineNet from the start that CleanNet's present probabilities lead to, through which no gradient
 goes. The losses are theirs, with these deviations: CleanNet's distance is a mean over edges and its weight the ratio
 that their sum has on four graphs of 3000 edges, so that large graphs do not count more; FineNet's loss is the mean over
-three passes, each of which starts where the one before ended, without its gradient, and turns linear at 0.005 in place
-of 0.05, because below its bound it hardly falls; both learn at a rate of 2e-3 from two graphs a step, the gradient is
-clipped, and the weights are running means.
+two passes, which start where up to seven passes before have ended, without their gradient, so that it learns to stay
+where many passes lead; and it turns linear at 0.005 in place of 0.05, because below its bound it hardly falls. Both
+learn at a rate of 1.5e-3 from one graph a step, the gradient is clipped, and the weights are running means.
 """
 
 import numpy as np
@@ -28,11 +28,10 @@ from .tree import both_ways, inlier_tree, kept_edges, start_rotations
 
 INLIER_DEG = 20.0
 HOPELESS_DEG = 90.0
-PASSES = 3
+PASSES, MOST_BEFORE = 2, 7
 _RECTIFIED, _RECTIFIED_BETA = 5.0, 0.2
 _CAMERAS, _FINE_BETA = 0.25, 0.005
-_RATE, _DECAY = 2e-3, 1e-4
-_BATCH, _CLIP = 2, 10.0
+_RATE, _DECAY, _CLIP = 1.5e-3, 1e-4, 10.0
 
 
 class Networks(nn.Module):
@@ -51,9 +50,10 @@ class Networks(nn.Module):
         of_clean = clean_loss(of_graph, logits, rectified, _single(truth))
         tree = inlier_tree(graph.problem, inlier)
         start = start_rotations(graph.problem, tree, directed, unit(rectified.detach().double().numpy()))
-        return of_clean + self._refinement(restricted(graph.problem, kept_edges(inlier, tree)), start, truth)
+        kept = restricted(graph.problem, kept_edges(inlier, tree))
+        return of_clean + self._refinement(kept, start, truth, int(rng.integers(MOST_BEFORE + 1)))
 
-    def _refinement(self, kept: Problem, rotations: Floats, truth: Floats) -> Tensor:
+    def _refinement(self, kept: Problem, rotations: Floats, truth: Floats, before: int) -> Tensor:
         """FineNet's loss from `rotations` (n, 3, 3), in whose world the truth is told; 0 where they are beyond hope."""
         root = int(np.argmin(so3.angle(rotations)))
         start, pinned = so3.to_quaternion(rotations), product(truth, inverse(truth[root]))
@@ -61,6 +61,9 @@ class Networks(nn.Module):
             return torch.zeros(())
         graph = TorchGraph(DirectedGraph.of(kept))
         cameras, losses = _single(start), []
+        with torch.no_grad():
+            for _ in range(before):
+                cameras = self.fine(graph, cameras)
         for _ in range(PASSES):
             cameras = self.fine(graph, cameras.detach())
             losses.append(fine_loss(graph, cameras, _single(pinned)))
@@ -122,4 +125,4 @@ def trainer(seed: int) -> TorchTrainer:
         torch.manual_seed(seed)
         networks = Networks()
     optimizer = torch.optim.Adam(networks.parameters(), lr=_RATE, weight_decay=_DECAY)
-    return TorchTrainer(networks, networks.loss, optimizer, batch=_BATCH, clip=_CLIP)
+    return TorchTrainer(networks, networks.loss, optimizer, clip=_CLIP)
