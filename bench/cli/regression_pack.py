@@ -95,19 +95,24 @@ def _failed(planned: "Run", needed: bool) -> int:
 
 
 def _other_version(planned: "Run", python: Path, methods: list[str]) -> Path:
-    """Run the same with another interpreter, in a folder beside this one's."""
+    """Run the same with another interpreter, in a folder beside this one's; nothing is drawn of it."""
+    import json
     import subprocess
 
     from bench.core.errors import InputError
 
     options, folder = planned.options, planned.store.folder
     other = folder.with_name(f"{folder.name}-other")
-    words = [str(python), "-m", "bench", "run", "--suite", SUITE, "--out", str(other), "--rerun", "always"]
-    words += [word for text in methods for word in ("-m", text)]
-    words += [word for path in options.plugins for word in ("--plugin", str(path))]
-    words += [
-        word for flag, n in (("--seeds", options.seeds), ("--jobs", options.jobs)) if n for word in (flag, str(n))
-    ]
+    given = {
+        "suite": SUITE,
+        "methods": methods,
+        "out": str(other),
+        "plugins": [str(path) for path in options.plugins],
+        "seeds": options.seeds,
+        "jobs": options.jobs,
+        "rerun": "always",
+    }
+    words = [str(python), "-c", "import bench, json, sys; bench.run(**json.loads(sys.argv[1]))", json.dumps(given)]
     try:
         done = subprocess.run(words, capture_output=True, text=True, check=False)
     except OSError as error:
