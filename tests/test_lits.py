@@ -172,3 +172,16 @@ def test_what_it_learns_helps_on_other_graphs(tmp_path: Path) -> None:
     after = judged(trainer)
     assert after[0] < 0.8 * before[0]
     assert after[1] < 0.5 * before[1]
+
+
+def test_the_shipped_weights_average_many_edges_and_withstand_outliers() -> None:
+    graph = upright(random_edges(50, 0.8))
+    shipped = LITS()
+    found = shipped.solve(graph.problem, RNG)
+    assert graph.truth is not None
+    assert found.edge_weights is not None
+    wrong = graph.problem.residuals(graph.truth) > np.radians(20)
+    assert 0.1 < wrong.mean() < 0.3
+    assert errors_deg(found.rotations, graph.truth).max() < np.degrees(np.median(graph.problem.residuals(graph.truth)))
+    assert np.median(found.edge_weights[wrong]) < 0.1 * np.median(found.edge_weights[~wrong])
+    assert any(shipped.weights_hash[:8] in note for note in found.notes)
