@@ -60,6 +60,8 @@ class RAGO(Warm, Learned):
     - It is trained on simulated graphs, by three rounds of three camera updates (the paper: three of four), on at most
       2,500 edges of each in a step; the paper's five rounds of four are what is run.
 
+    Updates are local: on long thin graphs, such as those of poses, twenty of them do not undo the drift of the tree.
+
     Parameters
     ----------
     outer
