@@ -11,6 +11,7 @@ from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 from numpy.typing import NDArray
 
 from bench import Instance, Problem, Skipped, catalog, so3
+from bench.datasets.collection_graph import CollectionGraph
 from bench.execution.here import solve_here
 from bench.learning.weights import write_weights
 from bench.methods._lib.learned.directed import DirectedGraph
@@ -180,3 +181,13 @@ def test_parallel_edges_are_fused(parallel: Problem, method: RAGO) -> None:
     found = solve_here(catalog("method")["rago"], {"weights": method.weights}, parallel)
     assert found.edge_weights is not None
     assert len(found.edge_weights) == parallel.m
+
+
+def test_the_shipped_weights_are_much_better_than_their_start() -> None:
+    graphs = [next(CollectionGraph(60).sources(None, seed)).load() for seed in range(4)]
+
+    def error(outer: int) -> float:
+        found = [RAGO(outer=outer).solve(graph.problem, RNG).rotations for graph in graphs]
+        return float(np.mean([np.median(errors_deg(f, g.truth)) for f, g in zip(found, graphs, strict=True)]))
+
+    assert error(5) < 0.75 * error(0)
