@@ -1,12 +1,11 @@
 """MSP: the derivative by hand is that of torch, both forms of its networks agree, and it learns."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from graphs import errors_deg, random_edges, simulated, transformed
 
-from bench import Instance
+from bench import Instance, Problem
+from bench.datasets._simulated.correlated import Law
 from bench.learning.weights import write_weights
 from bench.methods._lib.learned.directed import DirectedGraph
 from bench.methods._lib.learned.msp import network
@@ -14,6 +13,7 @@ from bench.methods._lib.learned.msp.propagation import gradient, propagated
 from bench.methods._lib.learned.msp.refinement import BEND, edge_loss, refined
 from bench.methods._lib.learned.msp.solution import Sources, View
 from bench.methods.msp import MSP
+from bench.methods.spanning_tree import SpanningTree
 
 torch = pytest.importorskip("torch")
 ROUNDS, SOURCE = 8, 3
@@ -177,9 +177,11 @@ def test_the_loss_falls() -> None:
     assert trainer.loss(held_out) < before
 
 
-def test_untrained_it_is_skipped_and_says_how_to_train_it(tmp_path: Path) -> None:
-    from bench import Skipped
-
-    if not MSP().weights_file.is_file():
-        with pytest.raises(Skipped, match="bench train msp"):
-            MSP().trained()
+def test_the_weights_that_are_shipped_beat_the_start_on_errors_as_they_are() -> None:
+    rng = np.random.default_rng(4)
+    edges = random_edges(60, 0.3, 4)
+    truth, rotations, _ = Law.drawn(rng).simulate(60, edges, rng)
+    problem = Problem(60, edges, rotations)
+    found = [errors_deg(method.solve(problem, rng).rotations, truth) for method in (MSP(), SpanningTree())]
+    assert np.median(found[0]) < 0.7 * np.median(found[1])
+    assert "CPU-" in " ".join(MSP().solve(problem, rng).notes)

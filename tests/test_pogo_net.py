@@ -1,19 +1,18 @@
 """The reconstruction of PoGO-Net: its two forms agree, no frame of the world matters, and it learns."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 from graphs import errors_deg, random_edges, simulated, transformed
 
 from bench import Instance, Problem, so3
+from bench.datasets._simulated.correlated import Law
 from bench.learning.weights import write_weights
 from bench.methods._lib.descent.descent import Descent
 from bench.methods._lib.learned.pogo_net.network import gates
 from bench.methods._lib.learned.pogo_net.view import View
 from bench.methods._lib.starts import start_rotations
 from bench.methods.pogo_net import PoGONet
+from bench.methods.spectral import Spectral
 
 torch = pytest.importorskip("torch")
 
@@ -131,10 +130,11 @@ def test_the_loss_falls() -> None:
     assert trainer.loss(held_out) < before
 
 
-def test_untrained_it_is_skipped_and_says_how_to_train_it(tmp_path: Path) -> None:
-    from bench import Skipped
-
-    untrained = replace(PoGONet(), weights="")
-    if not untrained.weights_file.is_file():
-        with pytest.raises(Skipped, match="bench train pogo-net"):
-            untrained.trained()
+def test_the_weights_that_are_shipped_beat_the_start_on_errors_as_they_are() -> None:
+    rng = np.random.default_rng(4)
+    edges = random_edges(60, 0.3, 4)
+    truth, rotations, _ = Law.drawn(rng).simulate(60, edges, rng)
+    problem = Problem(60, edges, rotations)
+    found = [errors_deg(method.solve(problem, rng).rotations, truth) for method in (PoGONet(), Spectral())]
+    assert np.median(found[0]) < 0.7 * np.median(found[1])
+    assert "CPU-" in " ".join(PoGONet().solve(problem, rng).notes)
