@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from graphs import grid_edges, random_edges, simulated, transformed
+from graphs import errors_deg, grid_edges, random_edges, simulated, transformed
 
 from bench import Floats, Instance, Problem, so3
 from bench.datasets.neurora_graphs import NeuRoRAGraphs
@@ -193,3 +193,19 @@ def test_a_graph_whose_start_is_hopeless_teaches_clean_net_alone() -> None:
     after = trainer.weights()
     changed = {name for name, array in before.items() if np.any(after[name] != array)}
     assert {name.split(".")[0] for name in changed} == {"clean"}
+
+
+def test_the_weights_that_are_shipped_tell_outliers_and_beat_their_start() -> None:
+    """On a graph from a seed that no training has."""
+    (source,) = NeuRoRAGraphs(100, 100).sources(None, 987_654)
+    graph, rng = source.load(), np.random.default_rng(0)
+    assert graph.truth is not None
+    assert graph.outliers is not None
+    found, start = (NeuRoRA(passes=p).solve(graph.problem, rng) for p in (12, 0))
+    trust = np.asarray(found.edge_weights)
+    right, wrong = trust[~graph.outliers], trust[graph.outliers]
+    assert np.mean(right[:, None] > wrong) > 0.9
+    assert np.median(errors_deg(found.rotations, graph.truth)) < 0.6 * np.median(
+        errors_deg(start.rotations, graph.truth)
+    )
+    assert "trained on simulated graphs" in found.notes[0]
