@@ -66,7 +66,7 @@ CONFIGURATIONS = [
     "crdmf[init=[spanning-tree,random],candidates=1]",
     "crdmf[preset=paper,candidates=2,iterations=500]",
     "msp[steps=[0,10]]",
-    "neurora[passes=[0,8]]",
+    "neurora[passes=[0,12]]",
     "pogo-net",
 ]
 
