@@ -46,8 +46,9 @@ class NeuRoRA(Learned):
     the law of the errors (see ``view-graph`` and ``photo-collection``).
 
     Measured once, at the end: on Ellis Island, NYC Library and Piazza del Popolo its median is a little below that of
-    `L1IRLS`, on Madrid Metropolis above; its means are larger on three of the four, because pieces that start wrong
-    stay so. On pose graphs and scans, whose cameras are not held as those of photographers are, it is of no use.
+    `L1IRLS`, on Madrid Metropolis above; its means are larger on the last three: in Madrid Metropolis and Piazza del
+    Popolo 25 and 44 cameras that start with one wrong turn in common keep it. On a pose graph and a scan, whose
+    cameras are not held as photographers hold theirs, it was of no use.
 
     Deviations: FineNet turns the cameras `passes` times (a number chosen on held-out simulated graphs), where theirs
     does so once, and step 4 is ours; its change multiplies the camera's quaternion from the right, in the world in
