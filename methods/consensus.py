@@ -8,23 +8,20 @@ from bench import Estimate, Floats, Problem, method, parameter, so3
 
 from ._lib.consensus.efficiency import widened
 from ._lib.consensus.evidence import noise_scale, support_by_triangles
-from ._lib.consensus.growth import grown
+from ._lib.consensus.growth import STRONGEST, grown
 from ._lib.consensus.half_edges import HalfEdges
 from ._lib.consensus.prior import prior_weights
 from ._lib.consensus.recombination import Judge, recombined
 from ._lib.consensus.settling import Settling
 from ._lib.consensus.uncertainty import camera_sigma
 from ._lib.descent.descent import Descent
-from ._lib.warm_up import Warm
+from ._lib.warm_up import solved_once
 
 FACTORS = (0.5, 1.0, 2.0, 4.0)  # of the noise scale, at which solutions are grown
 FACTORS_OF_LARGE, LARGE = (1.0, 2.0), 200_000  # edges, from which on fewer are affordable
 EDGES, MOST_ROOTS = 20_000, 12  # cameras to grow from: as many times as a graph has fewer edges than this
 UNSUPPORTED = 1e-3  # triangles, in place of none at an edge
-START_DEG, START = (
-    8.0,
-    4.0,
-)  # where the scales of the cameras begin to fall; the larger of these degrees and noise scales
+START_DEG, START = 8.0, 4.0  # where the scales of the cameras begin to fall; the larger of degrees and noise scales
 STEPS = 12  # of least squares, for each solution that was grown and for the final one
 TOGETHER_DEG = 2.0  # where the scales of the final one begin
 JUDGED, APART = 0.5, 4.0  # noise scales at which solutions are compared, and by which they stand elsewhere
@@ -40,7 +37,7 @@ JUDGED, APART = 0.5, 4.0  # noise scales at which solutions are compared, and by
     uses=("weights", "precisions", "gravity"),
 )
 @dataclass(frozen=True)
-class Consensus(Warm):
+class Consensus:
     """Maximises how many measurements every camera agrees with, on the scale on which enough do.
 
     1. Triangles tell the noise scale and, at 0.5, 1, 2 and 4 times it, how many of them vouch for each edge.
@@ -72,6 +69,10 @@ class Consensus(Warm):
     """
 
     agreeing: int = parameter(5, at_least=1)
+
+    def warm_up(self) -> None:
+        """Compile the kernels, also those for cameras with more edges than take part in the growth."""
+        solved_once(self, cameras=STRONGEST + 2)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         half = HalfEdges.of(problem)

@@ -9,6 +9,7 @@ from graphs import errors_deg, random_edges, simulated
 
 from bench.core import so3
 from bench.core.problem import Floats, Ints, Problem
+from bench.methods._lib.consensus import half_edges
 from bench.methods._lib.consensus.evidence import noise_scale, support_by_triangles
 from bench.methods._lib.consensus.growth import grown
 from bench.methods._lib.consensus.half_edges import HalfEdges
@@ -189,3 +190,12 @@ def test_photographs(real_data: Path, scene: str, mean: float, median: float) ->
     errors = errors_deg(solved(instance.problem), instance.truth)
     assert errors.mean() < mean
     assert np.median(errors) < median
+
+
+def test_cameras_of_many_edges_are_warmed_up_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    called = []
+    for name in ("_mark_strongest", "_reach"):
+        kernel = getattr(half_edges, name)
+        monkeypatch.setattr(half_edges, name, lambda *args, k=kernel, n=name: (called.append(n), k(*args)))
+    Consensus().warm_up()
+    assert set(called) == {"_mark_strongest", "_reach"}
