@@ -57,6 +57,7 @@ def test_steps_alone_decide_the_weights_however_often_it_stops(tmp_path: Path, f
         train("learner", again, Budget(steps=steps))
         again = replace(again, resume=True)
     assert rate(tmp_path / "again") == rate(folder)
+    assert pd.read_csv(tmp_path / "again" / CURVE)["steps"].tolist() == [0, 7, 20, 23, 29, 30]
     other = replace(settings(tmp_path / "other"), seed=1)
     train("learner", other, Budget(steps=30))
     assert rate(tmp_path / "other") != rate(folder)

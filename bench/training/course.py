@@ -61,15 +61,15 @@ class Course:
             tell(self._looked(math.nan))
         while self.steps < steps and self.cpu_s < cpu_s:
             losses.append(self._step())
-            if self.steps == _next(self.curve):
+            if self.steps >= _next(self.curve):
                 tell(self._looked(float(np.mean(losses))))
                 losses = []
             self.cpu_s = before + time.process_time() - began
             if time.monotonic() - kept > _KEEP_EVERY_S:
                 self.keep(self)
                 kept = time.monotonic()
-        if losses:
-            tell(self._looked(float(np.mean(losses))))
+        if self.curve[-1]["steps"] != self.steps:
+            tell(self._looked(float(np.mean(losses)) if losses else math.nan))
         self.keep(self)
 
     def _step(self) -> float:
