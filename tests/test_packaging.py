@@ -70,7 +70,9 @@ def test_every_source_is_in_the_wheel(built: Path, scripts: Path) -> None:
 def test_the_sdist_runs_its_own_tests(built: Path, tmp_path: Path) -> None:
     (sdist,) = built.glob("*.tar.gz")
     with tarfile.open(sdist) as archive:
-        archive.extractall(tmp_path, filter="data")
+        archive.extractall(
+            tmp_path, **({"filter": "data"} if hasattr(tarfile, "data_filter") else {})
+        )  # from 3.11.4 on
     (root,) = tmp_path.iterdir()
     pytest_here = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "error")
     assert "error" not in run(*pytest_here, "--collect-only", cwd=root).splitlines()[-1]

@@ -91,9 +91,10 @@ def _width_pt(grid: Grid) -> float:
     long = _long(grid)
     widths = [_longest([name, *(facts[k] for facts, _ in grid.rows)]) for k, name in enumerate(grid.facts)]
     total = sum(LINE_PT if lines else width for lines, width in zip(long, widths, strict=True))
-    for k, (title, params) in enumerate(grid.methods):
-        total += _longest([*_lines(title, params), *(cells[k].text for _, cells in grid.rows)])
-    return total + GAP_PT * (len(grid.facts) + len(grid.methods))
+    for title, own in itertools.groupby(range(len(grid.methods)), key=lambda k: grid.methods[k][0]):
+        below = [[*_lines("", grid.methods[k][1]), *(cells[k].text for _, cells in grid.rows)] for k in own]
+        total += max(sum(map(_longest, below)) + GAP_PT * (len(below) - 1), _longest(_lines(title, ""))) + GAP_PT
+    return total + GAP_PT * len(grid.facts)
 
 
 def _longest(texts: Sequence[str]) -> float:
