@@ -102,7 +102,7 @@ def test_names_that_hold_markup_stay_text(made):
 def test_every_number_has_its_protocol_and_its_command(pages):
     page = pages["methods/l1-irls.html"]
     assert page.count("truth-subgraph") >= 4
-    assert 'href="../runs.html#run-methods-1dsfm"' in page
+    assert 'href="../runs.html#run-methods-1dsfm-0-2-0"' in page
     assert "python -m bench run --suite methods --data-dir DIR --timeout 400" in pages["runs.html"]
 
 
