@@ -37,8 +37,9 @@ class PoGONet(Learned, Warm):
 
     1. Start from the spectral solution.
     2. In each of eight passes the network sees, for both directions of every edge, the measured rotation vector, how
-       many of the triangles at the edge close, and the residual log(R_ij R_j R_i^T) in the frame of camera i in units
-       of a scale s. Two layers of messages, whose means at the cameras are gated, give a gate for the edge.
+       many of the triangles at the edge close, the residual log(R_ij R_j R_i^T) in the frame of camera i in units of a
+       scale s, and how far s has fallen. Two layers of messages, whose means at the cameras are gated, give a gate for
+       the edge.
     3. One step of least squares over the whole graph, as in `L1IRLS`, with the weights
        g_ij / (1 + (angle / s)^2)^2. The scale s falls from 20 degrees to half the noise scale that triangles tell.
 

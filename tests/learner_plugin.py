@@ -15,21 +15,25 @@ def spectral(problem: Problem, weights: Floats) -> Floats:
     return so3.project(blocks if np.linalg.det(blocks).sum() > 0 else -blocks)
 
 
-def reweighted(problem: Problem, rate: float) -> Floats:
-    """Rotations (n, 3, 3) from two rounds."""
-    first = spectral(problem, np.ones(problem.m))
-    return spectral(problem, np.exp(-rate * problem.residuals(first)))
+def reweighted(problem: Problem, rate: float, rounds: int = 1) -> Floats:
+    """Rotations (n, 3, 3) from a first solution and some rounds."""
+    found = spectral(problem, np.ones(problem.m))
+    for _ in range(rounds):
+        found = spectral(problem, np.exp(-rate * problem.residuals(found)))
+    return found
 
 
 @method("learner", title="Learner", requires=("scipy",), supervised=True)
 @dataclass(frozen=True)
 class Learner(Learned):
-    """Two spectral rounds, the second with weights exp(-rate residual); the rate is learned."""
+    """A spectral solution, and rounds of it with weights exp(-rate residual); the rate is learned."""
+
+    rounds: int = 1
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:
         """Rotations of a problem."""
         rate = float(self.trained().arrays["rate"])
-        return Estimate(reweighted(problem, rate), notes=(self.note(),))
+        return Estimate(reweighted(problem, rate, self.rounds), notes=(self.note(),))
 
     def trainer(self, seed: int) -> Trainer:
         """What learns the rate."""

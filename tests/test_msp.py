@@ -153,20 +153,6 @@ def test_a_graph_too_long_for_its_memory_is_not_refined(untaught: MSP, monkeypat
     assert any("not refined" in note for note in estimate.notes)
 
 
-def test_training_is_repeated_bit_by_bit_and_goes_on_from_its_state() -> None:
-    graphs = [noisy(seed) for seed in range(2)]
-    whole, first, second = MSP().trainer(1), MSP().trainer(1), MSP().trainer(2)
-    for step in range(4):
-        whole.step(graphs, np.random.default_rng(step))
-    for step in range(2):
-        first.step(graphs, np.random.default_rng(step))
-    second.restore(first.state())
-    for step in range(2, 4):
-        second.step(graphs, np.random.default_rng(step))
-    for name, array in whole.weights().items():
-        np.testing.assert_array_equal(array, second.weights()[name])
-
-
 def test_the_loss_falls() -> None:
     graphs, held_out = [noisy(seed) for seed in range(4)], noisy(9)
     trainer = MSP().trainer(0)

@@ -172,17 +172,6 @@ def test_the_loss_falls_and_steps_alone_decide_the_weights() -> None:
     assert all(np.array_equal(array, runs[1][name]) for name, array in runs[0].items())
 
 
-def test_a_trainer_goes_on_where_another_ended() -> None:
-    graphs = [learned_from(seed) for seed in range(2)]
-    whole, half, rest = (NeuRoRA().trainer(seed) for seed in (0, 0, 1))
-    for trainer, steps in ((whole, range(4)), (half, range(2)), (rest, range(2, 4))):
-        if trainer is rest:
-            rest.restore(half.state())
-        for step in steps:
-            trainer.step(graphs, np.random.default_rng(step))
-    assert all(np.array_equal(array, rest.weights()[name]) for name, array in whole.weights().items())
-
-
 def test_a_graph_whose_start_is_hopeless_teaches_clean_net_alone() -> None:
     graph = learned_from(0)
     haar = so3.random(np.random.default_rng(0), graph.problem.m)

@@ -106,20 +106,6 @@ def test_the_derivative_of_the_loss_is_what_differences_tell() -> None:
     assert float((logits.grad * way).sum()) == pytest.approx(wanted, rel=1e-5)
 
 
-def test_training_is_repeated_bit_by_bit_and_goes_on_from_its_state() -> None:
-    graphs = [noisy(seed) for seed in range(2)]
-    whole, first, second = PoGONet().trainer(1), PoGONet().trainer(1), PoGONet().trainer(2)
-    for step in range(4):
-        whole.step(graphs, np.random.default_rng(step))
-    for step in range(2):
-        first.step(graphs, np.random.default_rng(step))
-    second.restore(first.state())
-    for step in range(2, 4):
-        second.step(graphs, np.random.default_rng(step))
-    for name, array in whole.weights().items():
-        np.testing.assert_array_equal(array, second.weights()[name])
-
-
 def test_the_loss_falls() -> None:
     graphs, held_out = [noisy(seed) for seed in range(4)], noisy(9)
     trainer = PoGONet().trainer(0)

@@ -134,7 +134,7 @@ def train(
     now = {**parameters, "weights": str(weights)}
 
     def keep(course: Course) -> None:
-        write_weights(weights, course.trainer.weights(), _provenance(info, datasets, settings, graphs, course))
+        write_weights(weights, course.trainer.weights(), _provenance(info, method, datasets, settings, graphs, course))
         course.save(settings.folder / STATE)
         pd.DataFrame(course.curve).to_csv(settings.folder / CURVE, index=False)
 
@@ -151,7 +151,7 @@ def train(
     rivals = [_rival(known.one(text), info, now) for text in (*filter(None, [learner.start]), *suite.methods)]
     others = [judged(*rival, graphs.held_out) for rival in rivals]
     rows = standings(replace(judged(info, now, graphs.held_out), label=method), others)
-    about = _provenance(info, datasets, settings, graphs, course)
+    about = _provenance(info, method, datasets, settings, graphs, course)
     about |= {"validation": [told(row) for row in rows], "verdict": verdict(rows)}
     write_weights(weights, course.trainer.weights(), about)
     return Trained(pd.DataFrame(course.curve), tuple(rows), len(graphs.held_out), graphs.absent)
@@ -166,12 +166,12 @@ def _rival(
 
 
 def _provenance(
-    info: MethodInfo, datasets: Sequence[str], settings: Settings, graphs: Graphs, course: Course
+    info: MethodInfo, method: str, datasets: Sequence[str], settings: Settings, graphs: Graphs, course: Course
 ) -> dict[str, Any]:
     return {
         "method": info.name,
         "source": info.source_hash,
-        "command": _command(info.name, datasets, settings, course.steps),
+        "command": _command(method, datasets, settings, course.steps),
         "seed": settings.seed,
         "steps": course.steps,
         "cpu_seconds": round(course.cpu_s, 1),
