@@ -6,7 +6,7 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, method, parameter, so3
 
-from ._lib.consensus.efficiency import widened
+from ._lib.consensus.efficiency import most_precise
 from ._lib.consensus.evidence import noise_scale, support_by_triangles
 from ._lib.consensus.growth import STRONGEST, grown
 from ._lib.consensus.half_edges import HalfEdges
@@ -50,8 +50,8 @@ class Consensus:
        half the noise scale). The others differ from it piece by piece, and each piece of another solution that
        raises the sum is taken over: single cameras, and folded parts as a whole; see `recombination`.
     5. The result is settled again, with two, four or eight times wider losses where that makes cameras more precise:
-       for errors that are nearly normal, as between poses; see `efficiency`. `camera_sigma` tells how far each camera
-       may be off; see `uncertainty`.
+       for errors that are nearly normal, as between poses; or with Cauchy's where errors crowd near zero and are
+       independent; see `efficiency`. `camera_sigma` tells how far each camera may be off; see `uncertainty`.
 
     Weights and precisions multiply the weights of the edges, and so does what gravity says of them; see `prior`.
 
@@ -87,13 +87,13 @@ class Consensus:
             pieces += taken
         final = Descent(problem, so3.from_quaternion(cameras), 0.0)
         narrow = settling.settle(final, np.radians(TOGETHER_DEG), STEPS)
-        scales, errors = widened(problem, settling, final, narrow)
-        weights = settling.weights(final.angles, scales)
+        fit = most_precise(problem, settling, final, narrow)
+        weights = settling.weights(final.angles, fit.scales, fit.power)
         taken_over = f"; {pieces} piece{'s' * (pieces > 1)} of others taken over" if pieces else ""
         return Estimate(
             so3.from_quaternion(final.cameras),
             edge_weights=weights,
-            camera_sigma=camera_sigma(problem, final, weights, scales, errors, noise),
+            camera_sigma=camera_sigma(problem, final, weights, fit, noise),
             iterations=final.iterations,
             stop_reason="all steps done",
             cost=-judge.of_angles(final.angles),

@@ -10,9 +10,9 @@ from bench.datasets._simulated.correlated import Law
 from bench.datasets._simulated.sizes import Sizes
 from bench.datasets._simulated.streets import Street
 from bench.methods._lib.consensus import propagation
+from bench.methods._lib.consensus.correlation import correlation
 from bench.methods._lib.consensus.propagation import added_up, strengths
 from bench.methods._lib.consensus.rivals import rival_places
-from bench.methods._lib.consensus.correlation import correlation
 from bench.methods._lib.descent.iterate import Iterate
 from bench.methods._lib.linear.laplacian import LaplacianSolver
 from bench.methods.consensus import Consensus

@@ -14,6 +14,7 @@ from .half_edges import HalfEdges
 NARROWEST, WIDEST, FIRST = np.radians([0.02, 60.0, 2.0])  # scales; the first that is tried
 CLOSE, MOST_TRIALS = 0.02, 12  # of the sum that has to be reached, and of scales that are tried for a camera
 SHARE = 0.3  # of the edges at a camera; more need not agree
+GEMAN_MCCLURE, CAUCHY = 2, 1  # q of the weights
 FEWEST, MOST = 2.0, 0.6  # but two must, or 60 % of fewer than four edges
 
 
@@ -21,8 +22,8 @@ class Settling:
     """Cameras that come to rest where each agrees with several of its edges, on whatever scale that is.
 
     The scale s_i of a camera is the smallest at which its edges' (1 + (r / s_i)^2)^-2 sum to `agreeing`, r being the
-    residuals; an edge has the larger scale of its cameras, s_ij, and the weight c_ij s_ij^-2 (1 + (r / s_ij)^2)^-2 of
-    the Geman-McClure loss of a measurement of that precision, c_ij its prior weight.
+    residuals; an edge has the larger scale of its cameras, s_ij, and the weight c_ij s_ij^-2 (1 + (r / s_ij)^2)^-q of
+    a measurement of that precision, c_ij its prior weight: q is 2 for the Geman-McClure loss and 1 for Cauchy's.
     """
 
     def __init__(self, problem: Problem, half: HalfEdges, prior: Floats, agreeing: int) -> None:
@@ -37,10 +38,10 @@ class Settling:
         _agreeing_scales(self._half.first, self._half.ids, angles, self._needed, NARROWEST, WIDEST, self._scales)
         return self._scales.copy()
 
-    def weights(self, angles: Floats, scales: Floats) -> Floats:
-        """(m,) weights for residuals (m,) and scales (n,) of the cameras."""
+    def weights(self, angles: Floats, scales: Floats, power: int = GEMAN_MCCLURE) -> Floats:
+        """(m,) weights for residuals (m,), scales (n,) of the cameras and q."""
         result = np.empty(len(angles))
-        _geman_mcclure(self._edges, self.prior, angles, scales, result)
+        _weigh(self._edges, self.prior, angles, scales, power, result)
         return result
 
     def settle(self, descent: Descent, start: float, steps: int) -> Floats:
@@ -59,12 +60,14 @@ def wider_scales(edges: Ints, scales: Floats) -> Floats:
 
 
 @compiled
-def _geman_mcclure(edges: Ints, prior: Floats, angles: Floats, scales: Floats, weights: Floats) -> None:
+def _weigh(edges: Ints, prior: Floats, angles: Floats, scales: Floats, power: int, weights: Floats) -> None:
     """Fill `weights` (m,), see `Settling`."""
     for e in range(len(edges)):
-        scale = max(scales[edges[e, 0]], scales[edges[e, 1]])
-        share = scale / (scale * scale + angles[e] * angles[e])
-        weights[e] = prior[e] * share * share
+        square = max(scales[edges[e, 0]], scales[edges[e, 1]]) ** 2
+        weight = 1 / (square + angles[e] * angles[e])
+        if power == GEMAN_MCCLURE:
+            weight *= square * weight
+        weights[e] = prior[e] * weight
 
 
 @compiled

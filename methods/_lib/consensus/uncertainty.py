@@ -7,6 +7,7 @@ from bench import Floats, Problem
 from ..descent.descent import Descent
 from ..descent.iterate import floored
 from .correlation import correlation
+from .efficiency import Fit
 from .propagation import added_up, strengths
 from .rivals import rival_places
 from .settling import wider_scales
@@ -17,9 +18,7 @@ USUAL = 1.0  # edges of usual misfit that every camera has beside its own
 MOST_LEVERAGE = 0.9
 
 
-def camera_sigma(
-    problem: Problem, descent: Descent, weights: Floats, scales: Floats, independent: Floats, noise: float
-) -> Floats:
+def camera_sigma(problem: Problem, descent: Descent, weights: Floats, fit: Fit, noise: float) -> Floats:
     """(n,) angle in radians below which a camera's error is expected with probability 68 %; below twice it with 95 %.
 
     Were errors independent, it would be 1.87 f_i e_i: e_i is the standard error along an axis with the neighbours held,
@@ -39,21 +38,19 @@ def camera_sigma(
         At the solution.
     weights
         (m,) of the edges there.
-    scales
-        (n,) of the cameras, radians.
-    independent
-        (n,) e_i, radians.
+    fit
+        The loss there, with e_i as its errors.
     noise
         The noise scale, radians.
     """
     weights = floored(weights)
     further = added_up(problem, weights, descent.inverse(weights))
-    alone = SIXTY_EIGHT * further * independent
+    alone = SIXTY_EIGHT * further * fit.errors
     common = CORRELATED * further**2 * _misfit(problem, weights, descent.angles)
-    wider = wider_scales(problem.edges, scales)
+    wider = wider_scales(problem.edges, fit.scales)
     chance = correlation(problem, descent.vectors, descent.angles, wider)
     near = np.minimum(alone ** (1 - chance) * np.maximum(alone, common) ** chance, np.pi)
-    agreement = 1 / (1 + (descent.angles / wider) ** 2) ** 2
+    agreement = 1 / (1 + (descent.angles / wider) ** 2) ** fit.power
     probable, possible = rival_places(problem, descent.vectors, descent.angles, agreement, noise, descent.inverse)
     near = np.maximum(near, np.where(probable > 0, probable + near, 0))
     return np.minimum(np.maximum(near, np.where(possible > 0, possible / 2 + near, 0)), np.pi)
