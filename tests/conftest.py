@@ -36,6 +36,14 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Failures(terminal))
 
 
+LONGEST = ("test_readme.py",)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes minutes in one test, lest one process be left with it at the end."""
+    items.sort(key=lambda item: item.path.name not in LONGEST)
+
+
 REAL_DATA = Path(__file__).parent.parent.parent / "shared" / "data"
 
 
