@@ -51,7 +51,7 @@ def test_both_forms_agree(network: PoGONet) -> None:
 
 
 def test_one_pass_of_training_moves_cameras_as_solve_does(network: PoGONet) -> None:
-    from bench.methods._lib.learned.pogo_net.training import least_squares
+    from bench.methods._lib.learned.torch_least_squares import least_squares
 
     problem = noisy(1).problem
     descent = Descent(problem, so3.random(np.random.default_rng(1), problem.n), 0.0)

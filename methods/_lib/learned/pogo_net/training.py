@@ -10,14 +10,12 @@ from ...descent.descent import Descent
 from ...starts import start_rotations
 from ..torch_errors import inliers, mean_loss
 from ..torch_layers import TorchGraph
+from ..torch_least_squares import least_squares
 from ..torch_trainer import TorchTrainer
 from .torch_network import GateNet
 from .view import LEAST_WEIGHT, PASSES, View, geman_mcclure
 
-EARLIER, SHARE = (
-    2,
-    0.25,
-)  # passes of a step that are learned from beside the last, and what each counts; the rest lead on
+EARLIER, SHARE = 2, 0.25  # passes that are learned from beside the last, and what each counts; the rest lead on
 BATCH, RATE, DECAY, CLIP = 2, 2e-3, 1e-4, 1.0
 OF_EDGES, OF_GATES = 0.5, 0.1  # weights of the relative errors and of the gates, that of the cameras being 1
 
@@ -80,13 +78,3 @@ class Joint:
         errors = errors - errors.median(dim=0).values  # the gauge: differentiated, as the mean of the steps is fixed
         of_gates = nn.functional.binary_cross_entropy_with_logits(logits, inliers(instance).to(logits))
         return mean_loss(errors) + OF_EDGES * mean_loss(errors[i] - errors[j]) + OF_GATES * of_gates
-
-
-def least_squares(n: int, i: Tensor, j: Tensor, weights: Tensor, vectors: Tensor) -> Tensor:
-    """The x (n, 3) of mean zero that minimise sum_e w_e |x_i - x_j - b_e|^2, of weights (m,) and vectors b (m, 3)."""
-    laplacian = weights.new_full((n, n), 1 / n)
-    laplacian = laplacian.index_put((i, j), -weights, accumulate=True).index_put((j, i), -weights, accumulate=True)
-    laplacian = laplacian.index_put((i, i), weights, accumulate=True).index_put((j, j), weights, accumulate=True)
-    pull = weights[:, None] * vectors
-    right = vectors.new_zeros((n, 3)).index_add(0, i, pull).index_add(0, j, -pull)
-    return torch.as_tensor(torch.linalg.solve(laplacian, right))
