@@ -6,7 +6,7 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, method, parameter, so3
 
-from ._lib.consensus.efficiency import most_precise
+from ._lib.consensus.efficiency import Fit, most_precise
 from ._lib.consensus.evidence import noise_scale, support_by_triangles
 from ._lib.consensus.growth import STRONGEST, grown
 from ._lib.consensus.half_edges import HalfEdges
@@ -25,6 +25,32 @@ START_DEG, START = 8.0, 4.0  # where the scales of the cameras begin to fall; th
 STEPS = 12  # of least squares, for each solution that was grown and for the final one
 TOGETHER_DEG = 2.0  # where the scales of the final one begin
 JUDGED, APART = 0.5, 4.0  # noise scales at which solutions are compared, and by which they stand elsewhere
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where consensus ends.
+
+    Parameters
+    ----------
+    settling, judge
+        Of this problem.
+    descent
+        At the solution.
+    fit
+        The loss that it is settled with.
+    noise
+        The noise scale, radians.
+    note
+        How it came about, in words.
+    """
+
+    settling: Settling
+    judge: Judge
+    descent: Descent
+    fit: Fit
+    noise: float
+    note: str
 
 
 @method(
@@ -75,6 +101,20 @@ class Consensus:
         solved_once(self, cameras=STRONGEST + 2)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
+        found = self.solution(problem)
+        weights = found.settling.weights(found.descent.angles, found.fit.scales, found.fit.power)
+        return Estimate(
+            so3.from_quaternion(found.descent.cameras),
+            edge_weights=weights,
+            camera_sigma=camera_sigma(problem, found.descent, weights, found.fit, found.noise),
+            iterations=found.descent.iterations,
+            stop_reason="all steps done",
+            cost=-found.judge.of_angles(found.descent.angles),
+            notes=(found.note,),
+        )
+
+    def solution(self, problem: Problem) -> Solution:
+        """Where the cameras come to rest, for methods that go on from there."""
         half = HalfEdges.of(problem)
         noise = noise_scale(half, problem.m)
         prior = prior_weights(problem, noise)
@@ -88,17 +128,8 @@ class Consensus:
         final = Descent(problem, so3.from_quaternion(cameras), 0.0)
         narrow = settling.settle(final, np.radians(TOGETHER_DEG), STEPS)
         fit = most_precise(problem, settling, final, narrow)
-        weights = settling.weights(final.angles, fit.scales, fit.power)
         taken_over = f"; {pieces} piece{'s' * (pieces > 1)} of others taken over" if pieces else ""
-        return Estimate(
-            so3.from_quaternion(final.cameras),
-            edge_weights=weights,
-            camera_sigma=camera_sigma(problem, final, weights, fit, noise),
-            iterations=final.iterations,
-            stop_reason="all steps done",
-            cost=-judge.of_angles(final.angles),
-            notes=(f"best of {len(settled)} solutions{taken_over}",),
-        )
+        return Solution(settling, judge, final, fit, noise, f"best of {len(settled)} solutions{taken_over}")
 
 
 def _starts(problem: Problem, half: HalfEdges, prior: Floats, noise: float) -> list[Floats]:

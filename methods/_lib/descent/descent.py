@@ -48,12 +48,13 @@ class Descent:
                 return True
         return False
 
-    def step(self, weights: Floats, longest: float = np.inf) -> float:
+    def step(self, weights: Floats, longest: float = np.inf, errors: Floats | None = None) -> float:
         """Move every camera to the minimum of the problem linearised with `weights` (m,); the mean step in radians.
 
-        Where that is above `longest`, the cameras move on beyond the minimum, by `RELAXATION`.
+        Where that is above `longest`, the cameras move on beyond the minimum, by `RELAXATION`. `errors` (m, 3) of the
+        measurements, as far as they are known, are taken off the residuals.
         """
-        steps = self._laplacian.solve(weights, self.vectors)
+        steps = self._laplacian.solve(weights, self.vectors if errors is None else self.vectors - errors)
         length = float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).mean())
         if length > longest:
             steps *= RELAXATION
