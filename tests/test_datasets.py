@@ -18,6 +18,7 @@ from bench.datasets._simulated.statistics import hardness
 from bench.datasets.erdos_renyi import ErdosRenyi
 from bench.datasets.one_dsfm import SCENES, OneDSfM
 from bench.datasets.pose_graph import PoseGraph, propagated
+from bench.plugins.catalog import catalog
 from bench.plugins.declare import Missing, Source
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -283,3 +284,20 @@ def test_hardness_of_a_ring(n: int) -> None:
     ring = Problem(n, edges, np.tile(np.eye(3), (n, 1, 1)))
     assert hardness(ring) == pytest.approx((2 - 2 * np.cos(2 * np.pi / n)) / n, rel=1e-6)
     assert hardness(Problem(n + 1, edges, ring.rotations)) == 0
+
+
+def test_the_clairvoyant_graph_is_the_same_without_its_outliers() -> None:
+    info = catalog("dataset")["erdos-renyi"]
+    (plain,), (without,) = (
+        list(info.configure({"n": 20, "clairvoyant": c}).sources(None, seed=3)) for c in (False, True)
+    )
+    assert plain.revision != without.revision
+    whole, inliers = plain.load(), without.load()
+    assert whole.outliers is not None
+    assert inliers.outliers is not None
+    kept = ~whole.outliers
+    assert (inliers.problem.edges == whole.problem.edges[kept]).all()
+    assert (inliers.problem.rotations == whole.problem.rotations[kept]).all()
+    assert (inliers.truth == whole.truth).all()  # type: ignore[union-attr]
+    assert not inliers.outliers.any()
+    assert (inliers.name, len(inliers.notes)) == ("n20-missing0.5-clairvoyant", 1)

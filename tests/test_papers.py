@@ -317,23 +317,6 @@ def test_the_bound_is_drawn_where_least_squares_attains_it(layout_file: Path, tm
     assert np.sqrt(squares).tolist() == pytest.approx(points["least squares"].tolist())
 
 
-def test_the_clairvoyant_graph_is_the_same_without_its_outliers() -> None:
-    info = catalog("dataset")["erdos-renyi"]
-    (plain,), (without,) = (
-        list(info.configure({"n": 20, "clairvoyant": c}).sources(None, seed=3)) for c in (False, True)
-    )
-    assert plain.revision != without.revision
-    whole, inliers = plain.load(), without.load()
-    assert whole.outliers is not None
-    assert inliers.outliers is not None
-    kept = ~whole.outliers
-    assert (inliers.problem.edges == whole.problem.edges[kept]).all()
-    assert (inliers.problem.rotations == whole.problem.rotations[kept]).all()
-    assert (inliers.truth == whole.truth).all()  # type: ignore[union-attr]
-    assert not inliers.outliers.any()
-    assert (inliers.name, len(inliers.notes)) == ("n20-missing0.5-clairvoyant", 1)
-
-
 def test_what_differs_from_the_published_properties_is_bold() -> None:
     table = PropertyTable(
         title="Needs",
