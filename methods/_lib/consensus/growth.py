@@ -10,7 +10,7 @@ from bench import Floats, Ints
 from ..loops.edge_kernels import compiled
 from .half_edges import HalfEdges
 
-STRONGEST = 30  # edges at a camera that take part in the growth
+STRONGEST = 10  # edges at a camera that take part in the growth
 OWN = 0.5  # vote of a measurement for the place that it asks for itself
 STEPS = 1e9  # in a vote; smaller differences are rounding, which must not decide
 
