@@ -6,13 +6,14 @@ import numpy as np
 
 from bench import Estimate, Floats, Problem, method, parameter, so3
 
-from ._lib.consensus.efficiency import Fit, most_precise
+from ._lib.consensus.efficiency import most_precise
 from ._lib.consensus.evidence import noise_scale, support_by_triangles
 from ._lib.consensus.growth import STRONGEST, grown
 from ._lib.consensus.half_edges import HalfEdges
 from ._lib.consensus.prior import prior_weights
 from ._lib.consensus.recombination import Judge, recombined
 from ._lib.consensus.settling import Settling
+from ._lib.consensus.solution import Solution
 from ._lib.consensus.uncertainty import camera_sigma
 from ._lib.descent.descent import Descent
 from ._lib.warm_up import solved_once
@@ -25,32 +26,6 @@ START_DEG, START = 8.0, 4.0  # where the scales of the cameras begin to fall; th
 STEPS = 12  # of least squares, for each solution that was grown and for the final one
 TOGETHER_DEG = 2.0  # where the scales of the final one begin
 JUDGED, APART = 0.5, 4.0  # noise scales at which solutions are compared, and by which they stand elsewhere
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """Where consensus ends.
-
-    Parameters
-    ----------
-    settling, judge
-        Of this problem.
-    descent
-        At the solution.
-    fit
-        The loss that it is settled with.
-    noise
-        The noise scale, radians.
-    note
-        How it came about, in words.
-    """
-
-    settling: Settling
-    judge: Judge
-    descent: Descent
-    fit: Fit
-    noise: float
-    note: str
 
 
 @method(
@@ -102,7 +77,7 @@ class Consensus:
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         found = self.solution(problem)
-        weights = found.settling.weights(found.descent.angles, found.fit.scales, found.fit.power)
+        weights = found.weights(found.descent.angles)
         return Estimate(
             so3.from_quaternion(found.descent.cameras),
             edge_weights=weights,

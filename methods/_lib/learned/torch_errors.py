@@ -4,7 +4,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bench import Instance, so3
+from bench import Floats, Instance, so3
 
 SMALL_DEG, FAR = 0.5, 0.05
 WRONG_DEG = 20.0
@@ -26,3 +26,16 @@ def inliers(instance: Instance) -> Tensor:
     true = instance.truth[i] @ np.swapaxes(instance.truth[j], 1, 2)
     wrong = so3.angle_between(instance.problem.rotations, true)
     return torch.from_numpy((wrong < np.radians(WRONG_DEG)).astype(np.float32))
+
+
+def left_over(steps: Tensor, cameras: Floats, instance: Instance) -> Tensor:
+    """(n, 3) rotation vectors, in radians, by which cameras (n, 4) are off after steps (n, 3) in the world.
+
+    The truth must be known. Its gauge is their geodesic median, and the median of what is left in each coordinate,
+    which is differentiated: the mean of the steps means nothing.
+    """
+    assert instance.truth is not None
+    between = np.swapaxes(so3.from_quaternion(cameras), 1, 2) @ instance.truth
+    wanted = torch.from_numpy(so3.log(between @ so3.geodesic_median(between).T))
+    errors = steps - wanted
+    return torch.as_tensor(errors - errors.median(dim=0).values)

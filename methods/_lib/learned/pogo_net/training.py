@@ -4,11 +4,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from bench import Floats, Instance, so3
+from bench import Floats, Instance
 
 from ...descent.descent import Descent
 from ...starts import start_rotations
-from ..torch_errors import inliers, mean_loss
+from ..torch_errors import inliers, left_over, mean_loss
 from ..torch_layers import TorchGraph
 from ..torch_least_squares import least_squares
 from ..torch_trainer import TorchTrainer
@@ -69,12 +69,8 @@ class Joint:
 
     def _loss(self, instance: Instance, descent: Descent, logits: Tensor, weights: Tensor) -> Tensor:
         """The loss of one pass; of the descent, which moves on before the derivative is taken, nothing is kept."""
-        assert instance.truth is not None
         i, j = torch.from_numpy(instance.problem.edges.astype("int64")).T
         steps = least_squares(instance.problem.n, i, j, weights, torch.from_numpy(descent.vectors.copy()))
-        between = np.swapaxes(so3.from_quaternion(descent.cameras), 1, 2) @ instance.truth
-        wanted = torch.from_numpy(so3.log(between @ so3.geodesic_median(between).T))
-        errors = steps - wanted
-        errors = errors - errors.median(dim=0).values  # the gauge: differentiated, as the mean of the steps is fixed
+        errors = left_over(steps, descent.cameras, instance)
         of_gates = nn.functional.binary_cross_entropy_with_logits(logits, inliers(instance).to(logits))
         return mean_loss(errors) + OF_EDGES * mean_loss(errors[i] - errors[j]) + OF_GATES * of_gates
