@@ -37,7 +37,7 @@ VARIANTS: dict[str, list[tuple[object, str, object]]] = {
     "no wider losses, no Cauchy": [(efficiency, "WIDER", ()), (efficiency, "NARROWER", ())],
     "no Cauchy": [(efficiency, "NARROWER", ())],
     "the judge four times wider": [(consensus, "JUDGED", 2.0)],
-    "ten edges take part in growth": [(growth, "STRONGEST", 10)],
+    "thirty edges take part in growth": [(growth, "STRONGEST", 30)],
     "60 % of few edges must agree": [(settling, "SHARE", 0.6)],
 }
 
