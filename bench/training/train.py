@@ -148,7 +148,8 @@ def train(
     if settings.resume:
         course.load(settings.folder / STATE)
     course.run(budget.steps, 60 * budget.cpu_minutes, tell)
-    rivals = [_rival(known.one(text), info, now) for text in (*filter(None, [learner.start]), *suite.methods)]
+    beside = dict.fromkeys([*filter(None, [learner.start]), *suite.methods])
+    rivals = [_rival(known.one(text), info, now) for text in beside]
     others = [judged(*rival, graphs.held_out) for rival in rivals]
     rows = standings(replace(judged(info, now, graphs.held_out), label=method), others)
     about = _provenance(info, method, datasets, settings, graphs, course)
