@@ -8,11 +8,11 @@ import numpy as np
 from bench import Estimate, Learned, Problem, Trainer, method, so3
 
 from ._lib.consensus.growth import STRONGEST
+from ._lib.consensus.solution import solution
 from ._lib.descent.iterate import floored
 from ._lib.learned.gated import gated
 from ._lib.learned.precision.view import View
 from ._lib.warm_up import solved_once
-from .consensus import Consensus
 
 PASSES = 3
 
@@ -66,7 +66,7 @@ class LearnedConsensus(Learned):
         solved_once(self, cameras=STRONGEST + 2)
 
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
-        arrays, found = self.trained().arrays, Consensus().solution(problem)
+        arrays, found = self.trained().arrays, solution(problem)
         view, descent = View.of(problem, found), found.descent
         for _ in range(PASSES):
             outputs = gated(arrays, view.graph, view.features(descent)).astype(np.float64)
@@ -85,4 +85,4 @@ class LearnedConsensus(Learned):
         """What learns the factors and errors."""
         from ._lib.learned.precision.training import trainer
 
-        return trainer(seed, Consensus().solution)
+        return trainer(seed)

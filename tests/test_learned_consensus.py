@@ -7,6 +7,7 @@ from graphs import errors_deg, random_edges, simulated, transformed
 from bench import Instance, Problem
 from bench.datasets._simulated.correlated import Law
 from bench.learning.weights import write_weights
+from bench.methods._lib.consensus.solution import solution
 from bench.methods._lib.learned.gated import gated
 from bench.methods._lib.learned.precision.view import View
 from bench.methods.consensus import Consensus
@@ -58,17 +59,17 @@ def test_both_forms_agree(network: LearnedConsensus) -> None:
     from bench.methods._lib.learned.torch_layers import TorchGraph
 
     problem = photographs(1).problem
-    solution = Consensus().solution(problem)
-    view, descent = View.of(problem, solution), solution.descent
+    found = solution(problem)
+    view, descent = View.of(problem, found), found.descent
     arrays, module = network.trained().arrays, GatedNet(WIDTH, OUTPUTS)
     module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in arrays.items()})
     with torch.no_grad():
-        wanted = Joint(module, Consensus().solution)._answers(TorchGraph(view.graph), view, descent)
+        wanted = Joint(module)._answers(TorchGraph(view.graph), view, descent)
     outputs = gated(arrays, view.graph, view.features(descent))
-    found = view.answers(descent, outputs.astype(np.float64))
-    assert np.ptp(found[0]) > 0.2
-    assert np.linalg.norm(found[1], axis=1).max() > np.radians(0.05)
-    for ours, theirs in zip(found, wanted, strict=True):
+    told = view.answers(descent, outputs.astype(np.float64))
+    assert np.ptp(told[0]) > 0.2
+    assert np.linalg.norm(told[1], axis=1).max() > np.radians(0.05)
+    for ours, theirs in zip(told, wanted, strict=True):
         np.testing.assert_allclose(ours, theirs.numpy(), atol=1e-5)
 
 
@@ -92,8 +93,8 @@ def test_the_derivative_of_the_loss_is_what_differences_tell() -> None:
     from bench.methods._lib.learned.precision.view import OUTPUTS, WIDTH
     from bench.methods._lib.learned.torch_gated import GatedNet
 
-    instance, joint = photographs(3), Joint(GatedNet(WIDTH, OUTPUTS), Consensus().solution)
-    descent, m = Consensus().solution(instance.problem).descent, instance.problem.m
+    instance, joint = photographs(3), Joint(GatedNet(WIDTH, OUTPUTS))
+    descent, m = solution(instance.problem).descent, instance.problem.m
     rng = np.random.default_rng(0)
     weights, errors = torch.from_numpy(rng.random(m) + 0.1), torch.from_numpy(0.01 * rng.standard_normal((m, 3)))
     way, turn = torch.from_numpy(rng.standard_normal(m)), torch.from_numpy(0.1 * rng.standard_normal((m, 3)))

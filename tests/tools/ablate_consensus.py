@@ -14,8 +14,7 @@ import numpy as np
 import bench
 from bench.core import so3
 from bench.core.problem import Floats, Instance
-from bench.methods import consensus
-from bench.methods._lib.consensus import efficiency, growth, recombination, settling
+from bench.methods._lib.consensus import efficiency, growth, recombination, settling, solution
 from bench.plugins.catalog import catalog
 from bench.plugins.declare import Source
 
@@ -30,13 +29,13 @@ GRAPHS = {
 }
 VARIANTS: dict[str, list[tuple[object, str, object]]] = {
     "as it is": [],
-    "one start": [(consensus, "FACTORS", (1.0,)), (consensus, "MOST_ROOTS", 1)],
-    "one root, four scales": [(consensus, "MOST_ROOTS", 1)],
+    "one start": [(solution, "FACTORS", (1.0,)), (solution, "MOST_ROOTS", 1)],
+    "one root, four scales": [(solution, "MOST_ROOTS", 1)],
     "no pieces of others": [(recombination, "MOST_PIECES", 0)],
-    "triangles do not vouch": [(consensus, "UNSUPPORTED", 1e6)],
+    "triangles do not vouch": [(solution, "UNSUPPORTED", 1e6)],
     "no wider losses, no Cauchy": [(efficiency, "WIDER", ()), (efficiency, "NARROWER", ())],
     "no Cauchy": [(efficiency, "NARROWER", ())],
-    "the judge four times wider": [(consensus, "JUDGED", 2.0)],
+    "the judge four times wider": [(solution, "JUDGED", 2.0)],
     "thirty edges take part in growth": [(growth, "STRONGEST", 30)],
     "60 % of few edges must agree": [(settling, "SHARE", 0.6)],
 }

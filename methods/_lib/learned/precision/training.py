@@ -1,14 +1,12 @@
 """How precisions are learned: by where the cameras stand after each pass."""
 
-from collections.abc import Callable
-
 import numpy as np
 import torch
 from torch import Tensor
 
-from bench import Instance, Problem, so3
+from bench import Instance, so3
 
-from ...consensus.solution import Solution
+from ...consensus.solution import Solution, solution
 from ...descent.descent import Descent
 from ...descent.iterate import SMALLEST_WEIGHT, floored
 from ..torch_errors import left_over, mean_loss
@@ -23,12 +21,12 @@ BATCH, RATE, DECAY, CLIP = 2, 2e-3, 1e-4, 1.0
 OF_EDGES = 0.5  # weight of the relative errors, that of the cameras being 1
 
 
-def trainer(seed: int, solution: Callable[[Problem], Solution]) -> TorchTrainer:
-    """A network that changes nothing yet, and goes on from solutions."""
+def trainer(seed: int) -> TorchTrainer:
+    """A network that changes nothing yet."""
     torch.manual_seed(seed)
     network = GatedNet(WIDTH, OUTPUTS)
     optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
-    return TorchTrainer(network, Joint(network, solution), optimizer, BATCH, CLIP)
+    return TorchTrainer(network, Joint(network), optimizer, BATCH, CLIP)
 
 
 class Joint:
@@ -39,8 +37,8 @@ class Joint:
     the network is told in the next one are not.
     """
 
-    def __init__(self, network: GatedNet, solution: Callable[[Problem], Solution]) -> None:
-        self._network, self._solution = network, solution
+    def __init__(self, network: GatedNet) -> None:
+        self._network = network
         self._seen: dict[int, tuple[Instance, Solution, View]] = {}
 
     def __call__(self, instance: Instance, rng: np.random.Generator) -> Tensor:
@@ -58,7 +56,7 @@ class Joint:
 
     def _prepared(self, instance: Instance) -> tuple[Solution, View]:
         if id(instance) not in self._seen:
-            found = self._solution(instance.problem)
+            found = solution(instance.problem)
             self._seen[id(instance)] = instance, found, View.of(instance.problem, found)
         return self._seen[id(instance)][1:]
 
