@@ -210,7 +210,7 @@ class TestLooks:
 
     def test_are_the_same_from_run_to_run(self) -> None:
         look = look_of("some-method[depth=3]")
-        assert (look.color, look.line, look.marker) == ("#E69F00", (0, (1, 1.2)), ">")
+        assert (look.color, look.line, look.marker) == ("#56B4E9", (0, (4, 1.5)), "s")
 
     def test_of_configurations_share_the_colour_and_nothing_else(self) -> None:
         plain, *others = (look_of(label("m", params)) for params in ("", *(f"depth={k}" for k in range(2, 7))))
