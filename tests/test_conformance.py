@@ -55,6 +55,7 @@ CONFIGURATIONS = [
     "dmf-synch[preset=dense]",
     "consensus",
     "consensus[agreeing=[1,8]]",
+    "learned-consensus",
     "hara",
     "hara[filter_deg=180,irls_iterations=0]",
     "lits",
