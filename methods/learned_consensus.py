@@ -11,10 +11,8 @@ from ._lib.consensus.growth import STRONGEST
 from ._lib.consensus.solution import solution
 from ._lib.descent.iterate import floored
 from ._lib.learned.gated import gated
-from ._lib.learned.precision.view import View
+from ._lib.learned.precision.view import PASSES, View
 from ._lib.warm_up import solved_once
-
-PASSES = 3
 
 
 @method(
@@ -44,7 +42,7 @@ class LearnedConsensus(Learned):
 
     Source: this project's own. That precisions of edges have more to give than telling outliers, and that messages
     should alternate with exact steps over the whole graph, are findings of this project. The layers are those of
-    `PoGONet`. Trained on simulated graphs of every kind there is here, on errors of absolute and relative rotations.
+    `PoGONet`. Trained on simulated graphs of six datasets, on errors of absolute and relative rotations.
     It beats `consensus` on held-out ones, and not on the photographs of 1DSfM, whose errors no simulation here quite
     matches. There are no standard errors: those of `consensus` would not be calibrated for it.
     """
@@ -69,7 +67,7 @@ class LearnedConsensus(Learned):
     def solve(self, problem: Problem, rng: np.random.Generator) -> Estimate:  # noqa: D102
         arrays, found = self.trained().arrays, solution(problem)
         view, descent = View.of(problem, found), found.descent
-        for _ in range(PASSES):
+        for _ in PASSES:
             outputs = gated(arrays, view.graph, view.features(descent)).astype(np.float64)
             factors, errors = view.answers(descent, outputs)
             weights = floored(found.weights(descent.angles) * factors)

@@ -16,7 +16,7 @@ WIDER = (2.0, 4.0, 8.0)  # times the scales of the cameras
 NARROWER = (0.5, 0.25)  # times the scales, of the Cauchy loss
 INDEPENDENT = 0.2  # chance that errors are correlated, from which on this is not tried
 STEPS, STEPS_OF_CAUCHY = 5, 8  # of least squares at each
-HOPE = 1.05  # times the best standard error so far; losses are tried that promise less than that as residuals are
+HOPE = 1.05  # times the best standard error so far; wider losses are tried that promise less than that as residuals are
 MOST_LEVERAGE = 0.9
 
 
@@ -93,9 +93,9 @@ def most_precise(problem: Problem, settling: Settling, descent: Descent, scales:
 
     From the scales at which some edges agree with a camera, wider ones are tried: the better, the more normal the
     errors are. Simulated errors are best averaged over many edges, real ones are not. A camera whose scale is wider
-    than most keeps it. Where none is better, errors crowd near zero, and the Cauchy loss, of whose weights the far
-    residuals keep more, is tried with narrower scales. It believes many edges a little, which is right only where
-    their errors are independent: residuals cannot tell how much correlated ones would mislead it.
+    than most keeps it. Where none is better, errors may crowd near zero: the Cauchy loss, which weighs far residuals
+    more than Geman and McClure's, is tried with narrower scales. It believes many edges a little, which is right only
+    where their errors are independent: residuals cannot tell how much correlated ones would mislead it.
 
     Parameters
     ----------

@@ -24,6 +24,8 @@ class DirectedGraph:
         (2m,) the edge of the problem that each is a direction of.
     reverse
         (2m,) where the other direction of each is.
+    forward
+        (2m,) 1 where a directed edge leads as the problem has it, -1 where it is the other direction.
     """
 
     n: int
@@ -32,6 +34,7 @@ class DirectedGraph:
     rotations: Floats
     edge: Ints
     reverse: Ints
+    forward: Floats
 
     @classmethod
     def of(cls, problem: Problem) -> "DirectedGraph":
@@ -43,7 +46,8 @@ class DirectedGraph:
         place = np.empty(2 * problem.m, np.int32)
         place[order] = np.arange(2 * problem.m, dtype=np.int32)
         reverse = np.concatenate([place[problem.m :], place[: problem.m]])[order]
-        return cls(problem.n, at[order], other[order], rotations[order], (order % problem.m).astype(np.int32), reverse)
+        edge, forward = (order % problem.m).astype(np.int32), np.where(order < problem.m, 1.0, -1.0)
+        return cls(problem.n, at[order], other[order], rotations[order], edge, reverse, forward)
 
     @cached_property
     def starts(self) -> Ints:

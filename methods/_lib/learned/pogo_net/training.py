@@ -52,8 +52,8 @@ class Joint:
             features = torch.from_numpy(view.features(descent, scale))
             kernel = torch.from_numpy(geman_mcclure(descent.angles, scale))
             with torch.set_grad_enabled(k in counted and torch.is_grad_enabled()):
-                logits = self._network(graph, features)[torch.from_numpy(view.forward > 0)]
-                order = torch.from_numpy(view.graph.edge[view.forward > 0].astype("int64"))
+                logits = self._network(graph, features)[torch.from_numpy(view.graph.forward > 0)]
+                order = torch.from_numpy(view.graph.edge[view.graph.forward > 0].astype("int64"))
                 logits = torch.zeros(problem.m).index_copy(0, order, logits)
                 weights = torch.sigmoid(logits).double() * kernel + LEAST_WEIGHT
                 if k in counted:

@@ -27,8 +27,6 @@ class View:
     ----------
     graph
         Both directions of its edges.
-    forward
-        (2m,) 1 where a directed edge leads as the problem has it, -1 where it is the other direction.
     fixed
         (2m, FEATURES + 3) rotation vector of the measurement, and what the triangles say, see `triangle_features`.
     scales
@@ -36,7 +34,6 @@ class View:
     """
 
     graph: DirectedGraph
-    forward: Floats
     fixed: Floats
     scales: Floats
 
@@ -47,8 +44,7 @@ class View:
         triangles, noise = triangle_features(problem)
         turns = np.arcsinh(so3.log(graph.rotations) / TURN)
         scales = np.geomspace(max(np.radians(WIDEST_DEG), noise), NARROWEST * noise, PASSES)
-        forward = np.where(graph.at == problem.edges[graph.edge, 0], 1.0, -1.0)
-        return cls(graph, forward, np.column_stack([turns, triangles[graph.edge]]).astype(np.float32), scales)
+        return cls(graph, np.column_stack([turns, triangles[graph.edge]]).astype(np.float32), scales)
 
     def features(self, descent: Descent, scale: float) -> Floats:
         """(2m, WIDTH) of the directed edges, where the cameras of a descent are now; float32.
@@ -56,7 +52,7 @@ class View:
         The residuals are those in the frames of the cameras, log(R_ij R_j R_i^T) in units of the scale, so that the
         world may be turned. The last feature is the same for all: how far the scale is from the last one.
         """
-        world = (self.forward[:, None] / scale) * descent.vectors[self.graph.edge]
+        world = (self.graph.forward[:, None] / scale) * descent.vectors[self.graph.edge]
         own = so3.from_quaternion(descent.cameras)[self.graph.at]
         seen = np.einsum("eab,eb->ea", own, world)
         size = np.log(LEAST + descent.angles[self.graph.edge] / scale)

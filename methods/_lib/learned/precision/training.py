@@ -14,9 +14,8 @@ from ..torch_gated import GatedNet
 from ..torch_layers import TorchGraph
 from ..torch_least_squares import least_squares
 from ..torch_trainer import TorchTrainer
-from .view import OUTPUTS, STRONGEST, WIDTH, View
+from .view import OUTPUTS, PASSES, STRONGEST, WIDTH, View
 
-PASSES = (0.25, 0.25, 0.5)  # what each counts
 BATCH, RATE, DECAY, CLIP = 2, 2e-3, 1e-4, 1.0
 OF_EDGES = 0.5  # weight of the relative errors, that of the cameras being 1
 

@@ -15,6 +15,7 @@ from ..triangles import FEATURES, triangle_features
 
 WIDTH = FEATURES + 13  # features of a directed edge
 OUTPUTS = 4  # a logarithm, and a vector
+PASSES = (0.25, 0.25, 0.5)  # of `solve`, and what each counts when it is learned
 TURN = 0.5  # radians, as which measured rotations count
 LEAST = 0.1  # added to a residual, in units of the scale, before its logarithm is taken
 FAR, DENSE = 3.0, 5.0  # logarithms, of scales and of degrees, that count as one
@@ -29,8 +30,6 @@ class View:
     ----------
     graph
         Both directions of its edges.
-    forward
-        (2m,) 1 where a directed edge leads as the problem has it, -1 where it is the other direction.
     fixed
         (2m, WIDTH - 4) what does not change with the residuals.
     scales
@@ -38,7 +37,6 @@ class View:
     """
 
     graph: DirectedGraph
-    forward: Floats
     fixed: Floats
     scales: Floats
 
@@ -58,12 +56,11 @@ class View:
         ]
         everywhere = np.tile(whole, (2 * problem.m, 1))
         fixed = np.column_stack([turns, triangles, own[graph.at], own[graph.other], everywhere])
-        forward = np.where(graph.at == problem.edges[graph.edge, 0], 1.0, -1.0)
-        return cls(graph, forward, fixed.astype(np.float32), scales)
+        return cls(graph, fixed.astype(np.float32), scales)
 
     def frames(self, descent: Descent) -> Floats:
         """(2m, 3, 3) what takes residuals in the world to how each camera sees those of its edges."""
-        return self.forward[:, None, None] * so3.from_quaternion(descent.cameras)[self.graph.at]
+        return self.graph.forward[:, None, None] * so3.from_quaternion(descent.cameras)[self.graph.at]
 
     def features(self, descent: Descent) -> Floats:
         """(2m, WIDTH) of the directed edges, where the cameras of a descent are now.
