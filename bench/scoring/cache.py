@@ -33,6 +33,7 @@ from bench.suite.plan import Job
 
 BATCH = 20_000  # rows of a file
 TOGETHER = 100  # estimates in memory
+READ = 4  # batches whose errors are kept in memory, for tables that ask for them row by row
 INSTANCES = 8  # kept in memory; jobs come instance by instance
 SOURCES = (
     "core/so3.py",
@@ -227,7 +228,13 @@ class _Part:
 
     def errors(self) -> pa.ChunkedArray:
         """The column of errors."""
-        return self.held if self.held is not None else pq.read_table(self.path, columns=["errors"]).column("errors")
+        return self.held if self.held is not None else _errors_on_disk(self.path)
+
+
+@lru_cache(maxsize=READ)
+def _errors_on_disk(path: Path) -> pa.ChunkedArray:
+    """The column of errors of a file, which nobody writes twice."""
+    return pq.read_table(path, columns=["errors"]).column("errors")
 
 
 def _read(path: Path) -> _Part | None:

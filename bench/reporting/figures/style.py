@@ -130,7 +130,7 @@ def log_axis(axis: Any, low: float, high: float, ticks: Sequence[float]) -> None
 
 
 def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """Write a figure in each format, fonts embedded, without a date; a missing folder is made."""
+    """Write a figure in each format, laid out once, fonts embedded, without a date; a missing folder is made."""
     folder.mkdir(parents=True, exist_ok=True)
     title, caption = described(figure)
     metadata: dict[str, dict[str, str | None]] = {
@@ -139,6 +139,8 @@ def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMA
     }
     paths = [folder / f"{name}.{suffix}" for suffix in formats]
     with styled():
+        figure.draw_without_rendering()
+        figure.set_layout_engine(None)  # else each format lays it out again
         for path, suffix in zip(paths, formats, strict=True):
             figure.savefig(path, format=suffix, metadata=metadata.get(suffix, {}))
     return paths

@@ -6,6 +6,7 @@ from collections.abc import Hashable, Iterator, Mapping, Set
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from bench.core import outcome
@@ -158,6 +159,7 @@ _VALUES = (
     "speedup_high",
     "roc_auc",
 )
+_NUMERIC = (*_VALUES, "n_cameras", "n_solved", "n_scored", "edges_percent", "hardness")
 SEEDS_LEGEND = "means over the seeds that ended well, ± half-width of the 95 % t interval over seeds"
 HARDNESS_LEGEND = (
     "hardness: second smallest eigenvalue of the graph's Laplacian over the number of cameras; lower is harder, "
@@ -169,6 +171,7 @@ ROC_LEGEND = "area under the ROC curve of a method's edge weights against the tr
 def scenes(frame: pd.DataFrame, ties: Ties) -> list[Scene]:
     """Group scored rows, keeping their order."""
     out = []
+    frame = frame.assign(**{name: pd.to_numeric(frame[name], errors="coerce") for name in _NUMERIC if name in frame})
     for (dataset, instance, protocol, alignment), rows in _groups(
         frame, ["dataset", "instance", "protocol", "alignment"]
     ):
@@ -232,7 +235,8 @@ def _first(rows: pd.DataFrame, column: str) -> float:
 
 
 def _numbers(column: pd.Series) -> list[float]:
-    return pd.to_numeric(column, errors="coerce").dropna().astype(float).tolist()
+    numbers = column.to_numpy(dtype=float)
+    return numbers[~np.isnan(numbers)].tolist()
 
 
 def _mean(numbers: list[float]) -> float:
