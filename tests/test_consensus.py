@@ -10,7 +10,11 @@ from graphs import errors_deg, random_edges, simulated
 from bench.core import so3
 from bench.core.problem import Floats, Ints, Problem
 from bench.methods._lib.consensus import half_edges
-from bench.methods._lib.consensus.evidence import noise_scale, support_by_triangles
+from bench.methods._lib.consensus.evidence import (
+    closing_angles,
+    noise_scale,
+    support_by_triangles,
+)
 from bench.methods._lib.consensus.growth import grown
 from bench.methods._lib.consensus.half_edges import HalfEdges
 from bench.methods._lib.consensus.prior import prior_weights
@@ -82,11 +86,11 @@ def test_the_noise_scale_is_that_of_good_triangles() -> None:
     for outliers in (0.0, 0.6):
         for noise in (0.5, 2.0):
             problem, _ = simulated(edges, noise_deg=noise, outliers=outliers)
-            scales[outliers, noise] = np.degrees(noise_scale(HalfEdges.of(problem), problem.m))
+            scales[outliers, noise] = np.degrees(noise_scale(closing_angles(HalfEdges.of(problem), problem.m)))
     assert scales[0.0, 2.0] == pytest.approx(4 * scales[0.0, 0.5], rel=0.1)
     assert scales[0.6, 2.0] < 4 * scales[0.0, 2.0]
     chain = Problem(3, np.array([[0, 1], [1, 2]], dtype=np.int32), np.tile(np.eye(3), (2, 1, 1)))
-    assert np.degrees(noise_scale(HalfEdges.of(chain), 2)) == pytest.approx(5)
+    assert np.degrees(noise_scale(closing_angles(HalfEdges.of(chain), 2))) == pytest.approx(5)
 
 
 def test_growth_puts_a_camera_where_most_neighbours_want_it() -> None:

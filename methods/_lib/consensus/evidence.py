@@ -16,14 +16,25 @@ QUANTILE, FACTOR = 0.02, 2.0
 NARROWEST, WIDEST, UNKNOWN = np.radians([0.2, 6.0, 5.0])
 
 
-def noise_scale(half: HalfEdges, m: int) -> float:
-    """Scale in radians at which good triangles close: twice the 2 % quantile of the angles by which they do not.
+def closing_angles(half: HalfEdges, m: int) -> Ints:
+    """Histogram (BINS,), up to 180 degrees, of the angles by which triangles do not close: up to 8 over each edge."""
+    histogram = np.zeros(BINS, dtype=np.int32)
+    _visit(half, SAMPLE, np.zeros(0), np.zeros((m, 0)), histogram)
+    return histogram
+
+
+def triangles_over_edges(half: HalfEdges, m: int, histogram: Ints) -> float:
+    """How many triangles of that histogram are over an edge, on average."""
+    each = 3 if _whole(half, SAMPLE) else 1  # edges that a triangle was counted for at once
+    return each * float(histogram.sum()) / m
+
+
+def noise_scale(histogram: Ints) -> float:
+    """Scale in radians at which good triangles close: twice the 2 % quantile of `closing_angles`.
 
     So low a quantile is that of good triangles even where most edges are wrong. Limited to 0.2 and 6 degrees; 5 where
     the graph has no triangle.
     """
-    histogram = np.zeros(BINS, dtype=np.int32)
-    _visit(half, SAMPLE, np.zeros(0), np.zeros((m, 0)), histogram)
     if not histogram.any():
         return float(UNKNOWN)
     cumulated = np.cumsum(histogram)
@@ -49,10 +60,14 @@ def support_by_triangles(half: HalfEdges, m: int, scales: Floats) -> Floats:
 
 def _visit(half: HalfEdges, most: int, scales: Floats, support: Floats, histogram: Ints) -> None:
     """Visit up to `most` triangles over each edge; see `_visit_triangles`."""
-    whole = most >= np.diff(half.first).max()
+    whole = _whole(half, most)
     _visit_triangles(
         half.ranks, half.first, half.others, half.ids, half.quaternions, most, whole, scales, support, histogram
     )
+
+
+def _whole(half: HalfEdges, most: int) -> bool:
+    return bool(most >= np.diff(half.first).max())
 
 
 @compiled

@@ -44,11 +44,14 @@ class Settling:
         _weigh(self._edges, self.prior, angles, scales, power, result)
         return result
 
-    def settle(self, descent: Descent, start: float, steps: int) -> Floats:
-        """Move the cameras, in `steps`, with scales that fall from `start` to those of the cameras; the scales (n,)."""
+    def settle(self, descent: Descent, start: float, steps: int, narrowest: float = 0.0) -> Floats:
+        """Move the cameras, in `steps`, with scales that fall from `start` to those of the cameras; the scales (n,).
+
+        None falls below `narrowest`; radians.
+        """
         for step in range(steps):
             reached = step / (steps - 1)
-            scales = self.scales(descent.angles)
+            scales = np.maximum(self.scales(descent.angles), narrowest)
             wide = np.maximum(start ** (1 - reached) * scales**reached, scales)
             descent.step(floored(self.weights(descent.angles, wide)))
         return self.scales(descent.angles)

@@ -7,8 +7,13 @@ import numpy as np
 from bench import Floats, Problem, so3
 
 from ..descent.descent import Descent
+from ..descent.losses import LOSSES
+from ..graph.confidence import confidence
+from ..linear.spectral import spectral_rotations
+from ..starts import TOLERANCE
+from .common_scale import with_common_scale
 from .efficiency import Fit, most_precise
-from .evidence import noise_scale, support_by_triangles
+from .evidence import closing_angles, noise_scale, support_by_triangles, triangles_over_edges
 from .growth import grown
 from .half_edges import HalfEdges
 from .prior import prior_weights
@@ -19,11 +24,14 @@ AGREEING = 5  # edges that are to agree with a camera
 FACTORS = (0.5, 1.0, 2.0, 4.0)  # of the noise scale, at which solutions are grown
 FACTORS_OF_LARGE, LARGE = (1.0, 2.0), 200_000  # edges, from which on fewer are affordable
 EDGES, MOST_ROOTS = 20_000, 12  # cameras to grow from: as many times as a graph has fewer edges than this
+ENOUGH_TRIANGLES = 1.0  # over an edge, on average, to vouch for edges
 UNSUPPORTED = 1e-3  # triangles, in place of none at an edge
 START_DEG, START = 8.0, 4.0  # where the scales of the cameras begin to fall; the larger of degrees and noise scales
+STEPS_OF_L1, ENOUGH = 10, np.radians(0.057)  # of least absolute residuals, and the step that is the last
 STEPS = 12  # of least squares, for each solution that was grown and for the final one
 TOGETHER_DEG = 2.0  # where the scales of the final one begin
-JUDGED, APART = 0.5, 4.0  # noise scales at which solutions are compared, and by which they stand elsewhere
+JUDGED, JUDGED_UNVOUCHED = 0.5, 2.0  # noise scales at which solutions are compared
+APART = 4.0  # noise scales by which pieces stand elsewhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +48,8 @@ class Solution:
         The loss that it is settled with.
     noise
         The noise scale, radians.
+    vouched
+        Whether there are triangles that vouch for edges.
     note
         How it came about, in words.
     """
@@ -49,6 +59,7 @@ class Solution:
     descent: Descent
     fit: Fit
     noise: float
+    vouched: bool
     note: str
 
     def weights(self, angles: Floats) -> Floats:
@@ -59,20 +70,30 @@ class Solution:
 def solution(problem: Problem, agreeing: int = AGREEING) -> Solution:
     """Where the cameras come to rest; the steps are those of `Consensus`."""
     half = HalfEdges.of(problem)
-    noise = noise_scale(half, problem.m)
+    closing = closing_angles(half, problem.m)
+    noise, vouched = noise_scale(closing), triangles_over_edges(half, problem.m, closing) >= ENOUGH_TRIANGLES
     prior = prior_weights(problem, noise)
-    settling, judge = Settling(problem, half, prior, agreeing), Judge(problem, JUDGED * noise)
-    settled = [_settled(problem, settling, noise, start) for start in _starts(problem, half, prior, noise)]
+    settling = Settling(problem, half, prior, agreeing)
+    judge = Judge(problem, (JUDGED if vouched else JUDGED_UNVOUCHED) * noise)
+    starts = [so3.from_quaternion(start) for start in _starts(problem, half, prior, noise)]
+    starts += [] if vouched else [_least_absolute(problem)]
+    widest = max(np.radians(START_DEG), START * noise)
+    settled = [_settled(problem, settling, start, widest, 0.0 if vouched else noise) for start in starts]
     settled.sort(key=lambda descent: -judge.of_angles(descent.angles))
     cameras, pieces = settled[0].cameras, 0
     for other in settled[1:]:
         cameras, taken = recombined(judge, cameras, other.cameras, APART * noise)
         pieces += taken
     final = Descent(problem, so3.from_quaternion(cameras), 0.0)
-    narrow = settling.settle(final, np.radians(TOGETHER_DEG), STEPS)
-    fit = most_precise(problem, settling, final, narrow)
+    if vouched:
+        fit = most_precise(problem, settling, final, settling.settle(final, np.radians(TOGETHER_DEG), STEPS))
+    else:
+        fit = with_common_scale(problem, settling, final, noise, widest)
     taken_over = f"; {pieces} piece{'s' * (pieces > 1)} of others taken over" if pieces else ""
-    return Solution(settling, judge, final, fit, noise, f"best of {len(settled)} solutions{taken_over}")
+    common = "" if vouched else "; one scale for all cameras, as there are few triangles"
+    return Solution(
+        settling, judge, final, fit, noise, vouched, f"best of {len(settled)} solutions{taken_over}{common}"
+    )
 
 
 def _starts(problem: Problem, half: HalfEdges, prior: Floats, noise: float) -> list[Floats]:
@@ -88,8 +109,16 @@ def _starts(problem: Problem, half: HalfEdges, prior: Floats, noise: float) -> l
     ]
 
 
-def _settled(problem: Problem, settling: Settling, noise: float, start: Floats) -> Descent:
-    """A grown solution (n, 4) after reweighted least squares."""
-    descent = Descent(problem, so3.from_quaternion(start), 0.0)
-    settling.settle(descent, max(np.radians(START_DEG), START * noise), STEPS)
+def _least_absolute(problem: Problem) -> Floats:
+    """The solution (n, 3, 3) with the least sum of absolute residuals near the spectral one."""
+    start = spectral_rotations(problem, confidence(problem), regularisation=1.0, tolerance=TOLERANCE)[0]
+    descent = Descent(problem, start, ENOUGH)
+    descent.reweight(LOSSES["l1"], 1.0, STEPS_OF_L1)
+    return so3.from_quaternion(descent.cameras)
+
+
+def _settled(problem: Problem, settling: Settling, start: Floats, widest: float, narrowest: float) -> Descent:
+    """A start (n, 3, 3) after reweighted least squares, with scales that fall from the widest; radians."""
+    descent = Descent(problem, start, 0.0)
+    settling.settle(descent, widest, STEPS, narrowest)
     return descent

@@ -4,7 +4,7 @@ import numpy as np
 
 from bench import Floats, Problem
 
-from ..consensus.evidence import noise_scale, support_by_triangles
+from ..consensus.evidence import closing_angles, noise_scale, support_by_triangles
 from ..consensus.half_edges import HalfEdges
 
 FEATURES = 4
@@ -19,7 +19,7 @@ def triangle_features(problem: Problem) -> tuple[Floats, float]:
     the edge; the share of those that close at three times that scale; whether there is any. Features are float32.
     """
     half = HalfEdges.of(problem)
-    noise = noise_scale(half, problem.m)
+    noise = noise_scale(closing_angles(half, problem.m))
     close, near, every = support_by_triangles(half, problem.m, noise * np.array([1, WIDER, EVERY]))
     total = np.maximum(every, 1)
     features = np.column_stack([np.log1p(close) / MANY, close / total, near / total, every > 0])
