@@ -42,7 +42,8 @@ OUT_OF_RANGE = {
         "street-graph[n=1]", "street-graph[degree=1]", "street-graph[noise_deg=20]", "street-graph[outliers=0.5]",
         "collection-graph[n=1]", "collection-graph[n=3001]", "collection-graph[degree=1]",
         "collection-graph[noise_deg=0]", "collection-graph[outliers=0.5]",
-        "neurora-graphs[fewest=2]", "neurora-graphs[most=5001]",
+        "neurora-graphs[fewest=2]", "neurora-graphs[most=5001]", "trajectory[n=8]", "trajectory[noise_deg=-1]",
+        "trajectory[wrong=1.1]",
     ],
 }  # fmt: skip
 
