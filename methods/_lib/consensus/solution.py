@@ -72,13 +72,13 @@ def solution(problem: Problem, agreeing: int = AGREEING) -> Solution:
     half = HalfEdges.of(problem)
     closing = closing_angles(half, problem.m)
     noise, vouched = noise_scale(closing), triangles_over_edges(half, problem.m, closing) >= ENOUGH_TRIANGLES
+    judged, narrowest = (JUDGED * noise, 0.0) if vouched else (JUDGED_UNVOUCHED * noise, noise)
     prior = prior_weights(problem, noise)
-    settling = Settling(problem, half, prior, agreeing)
-    judge = Judge(problem, (JUDGED if vouched else JUDGED_UNVOUCHED) * noise)
+    settling, judge = Settling(problem, half, prior, agreeing), Judge(problem, judged)
     starts = [so3.from_quaternion(start) for start in _starts(problem, half, prior, noise)]
     starts += [] if vouched else [_least_absolute(problem)]
     widest = max(np.radians(START_DEG), START * noise)
-    settled = [_settled(problem, settling, start, widest, 0.0 if vouched else noise) for start in starts]
+    settled = [_settled(problem, settling, start, widest, narrowest) for start in starts]
     settled.sort(key=lambda descent: -judge.of_angles(descent.angles))
     cameras, pieces = settled[0].cameras, 0
     for other in settled[1:]:
@@ -89,11 +89,10 @@ def solution(problem: Problem, agreeing: int = AGREEING) -> Solution:
         fit = most_precise(problem, settling, final, settling.settle(final, np.radians(TOGETHER_DEG), STEPS))
     else:
         fit = with_common_scale(problem, settling, final, noise, widest)
-    taken_over = f"; {pieces} piece{'s' * (pieces > 1)} of others taken over" if pieces else ""
-    common = "" if vouched else "; one scale for all cameras, as there are few triangles"
-    return Solution(
-        settling, judge, final, fit, noise, vouched, f"best of {len(settled)} solutions{taken_over}{common}"
-    )
+    note = f"best of {len(settled)} solutions"
+    note += f"; {pieces} piece{'s' * (pieces > 1)} of others taken over" if pieces else ""
+    note += "" if vouched else "; one scale for all cameras, as there are few triangles"
+    return Solution(settling, judge, final, fit, noise, vouched, note)
 
 
 def _starts(problem: Problem, half: HalfEdges, prior: Floats, noise: float) -> list[Floats]:
