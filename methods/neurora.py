@@ -40,14 +40,14 @@ class NeuRoRA(Learned):
        less from that (the mean angle): without errors it is exact.
 
     Source: Purkait, Chin and Reid, ECCV 2020, and their code, whose networks, features, costs and limits these are.
-    They published no weights for real scenes. These networks were trained here, for minutes instead of days and on
+    They published no weights for real scenes. These networks were trained here, for two hours instead of days and on
     simulated measurements alone: their own graphs, photo collections, and pieces of the topologies of twelve scenes of
     1DSfM, not those of its four scenes in ``results/reference``; what Madrid Metropolis and Union Square informed is
     the law of the errors (see ``view-graph`` and ``photo-collection``).
 
     Measured once, at the end: on Ellis Island, NYC Library and Piazza del Popolo its median is a little below that of
     `L1IRLS`, on Madrid Metropolis above; its means are larger on the last three: in Madrid Metropolis and Piazza del
-    Popolo 25 and 44 cameras that start with one wrong turn in common keep it. On a pose graph and a scan, whose
+    Popolo pieces that start with one wrong turn keep it. On a pose graph and a scan, whose
     cameras are not held as photographers hold theirs, it was of no use.
 
     Deviations: FineNet turns the cameras `passes` times (a number chosen on held-out simulated graphs), where theirs

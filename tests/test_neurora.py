@@ -185,16 +185,18 @@ def test_a_graph_whose_start_is_hopeless_teaches_clean_net_alone() -> None:
 
 
 def test_the_weights_that_are_shipped_tell_outliers_and_beat_their_start() -> None:
-    """On a graph from a seed that no training has."""
-    (source,) = NeuRoRAGraphs(100, 100).sources(None, 987_654)
-    graph, rng = source.load(), np.random.default_rng(0)
-    assert graph.truth is not None
-    assert graph.outliers is not None
-    found, start = (NeuRoRA(passes=p).solve(graph.problem, rng) for p in (12, 0))
-    trust = np.asarray(found.edge_weights)
-    right, wrong = trust[~graph.outliers], trust[graph.outliers]
-    assert np.mean(right[:, None] > wrong) > 0.9
-    assert np.median(errors_deg(found.rotations, graph.truth)) < 0.6 * np.median(
-        errors_deg(start.rotations, graph.truth)
-    )
+    """On graphs from seeds that no training has."""
+    ratios, rng = [], np.random.default_rng(0)
+    for seed in range(987_654, 987_658):
+        (source,) = NeuRoRAGraphs(100, 100).sources(None, seed)
+        graph = source.load()
+        assert graph.truth is not None
+        assert graph.outliers is not None
+        found, start = (NeuRoRA(passes=p).solve(graph.problem, rng) for p in (12, 0))
+        trust = np.asarray(found.edge_weights)
+        right, wrong = trust[~graph.outliers], trust[graph.outliers]
+        assert np.mean(right[:, None] > wrong) > 0.9
+        medians = [np.median(errors_deg(estimate.rotations, graph.truth)) for estimate in (found, start)]
+        ratios.append(medians[0] / medians[1])
+    assert np.mean(ratios) < 0.85
     assert "trained on simulated graphs" in found.notes[0]
