@@ -45,7 +45,7 @@ class NeuRoRA(Learned):
     1DSfM, not those of its four scenes in ``results/reference``; what Madrid Metropolis and Union Square informed is
     the law of the errors (see ``view-graph`` and ``photo-collection``).
 
-    Measured once, at the end: on Ellis Island, NYC Library and Piazza del Popolo its median is a little below that of
+    Measured at the end: on Ellis Island, NYC Library and Piazza del Popolo its median is a little below that of
     `L1IRLS`, on Madrid Metropolis above; its means are larger on the last three: in Madrid Metropolis and Piazza del
     Popolo pieces that start with one wrong turn keep it. On a pose graph and a scan, whose
     cameras are not held as photographers hold theirs, it was of no use.

@@ -186,7 +186,7 @@ def test_a_graph_whose_start_is_hopeless_teaches_clean_net_alone() -> None:
 
 def test_the_weights_that_are_shipped_tell_outliers_and_beat_their_start() -> None:
     """On graphs from seeds that no training has."""
-    ratios, rng = [], np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     for seed in range(987_654, 987_658):
         (source,) = NeuRoRAGraphs(100, 100).sources(None, seed)
         graph = source.load()
@@ -197,6 +197,6 @@ def test_the_weights_that_are_shipped_tell_outliers_and_beat_their_start() -> No
         right, wrong = trust[~graph.outliers], trust[graph.outliers]
         assert np.mean(right[:, None] > wrong) > 0.9
         medians = [np.median(errors_deg(estimate.rotations, graph.truth)) for estimate in (found, start)]
-        ratios.append(medians[0] / medians[1])
-    assert np.mean(ratios) < 0.85
+        assert medians[0] < 0.75 * medians[1]
+        assert medians[0] < 2.8
     assert "trained on simulated graphs" in found.notes[0]

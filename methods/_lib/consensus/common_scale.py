@@ -7,12 +7,11 @@ from bench import Floats, Problem
 from ..descent.descent import Descent
 from ..descent.iterate import floored
 from .efficiency import Fit
-from .propagation import strengths
+from .propagation import strengths, without_own_edge
 from .settling import GEMAN_MCCLURE, Settling
 
 STEPS = 5  # of least squares at each scale
 NARROWEST = np.radians(0.02)
-MOST_LEVERAGE = 0.9
 
 
 def with_common_scale(problem: Problem, settling: Settling, descent: Descent, first: float, widest: float) -> Fit:
@@ -34,7 +33,7 @@ def with_common_scale(problem: Problem, settling: Settling, descent: Descent, fi
         scales = np.full(problem.n, scale)
         for _ in range(STEPS):
             descent.step(floored(settling.weights(descent.angles, scales)))
-        without = _without_own_edge(problem, settling.weights(descent.angles, scales), descent.angles)
+        without = without_own_edge(problem, settling.weights(descent.angles, scales), descent.angles)
         own, narrower = (_variance(problem, settling.prior, without, s) for s in (scale, scale / 2))
         return own <= narrower
 
@@ -58,13 +57,6 @@ def _errors(problem: Problem, settling: Settling, descent: Descent, scale: float
     weights = settling.weights(descent.angles, np.full(problem.n, scale))
     variance = _variance(problem, settling.prior, descent.angles, scale)
     return np.sqrt(variance * weights.mean() / strengths(problem, weights))
-
-
-def _without_own_edge(problem: Problem, weights: Floats, angles: Floats) -> Floats:
-    """Residuals (m,) as if their edge had not taken part: over 1 - h, h being the leverage, see `standard_error`."""
-    i, j = problem.edges.T
-    sums = strengths(problem, weights)
-    return np.asarray(angles / (1 - np.minimum(weights * (1 / sums[i] + 1 / sums[j]), MOST_LEVERAGE)))
 
 
 def _variance(problem: Problem, prior: Floats, angles: Floats, scale: float) -> float:

@@ -10,6 +10,7 @@ from ..descent.descent import Descent
 from ..descent.iterate import floored
 from ..loops.edge_kernels import compiled
 from .correlation import correlation
+from .propagation import MOST_LEVERAGE
 from .settling import CAUCHY, GEMAN_MCCLURE, Settling, wider_scales
 
 WIDER = (2.0, 4.0, 8.0)  # times the scales of the cameras
@@ -17,7 +18,6 @@ NARROWER = (0.5, 0.25)  # times the scales, of the Cauchy loss
 INDEPENDENT = 0.2  # chance that errors are correlated, from which on this is not tried
 STEPS, STEPS_OF_CAUCHY = 5, 8  # of least squares at each
 HOPE = 1.05  # times the best standard error so far; wider losses are tried that promise less than that as residuals are
-MOST_LEVERAGE = 0.9
 
 
 class Fit(NamedTuple):

@@ -10,6 +10,7 @@ Inverse = Callable[[Floats], Floats]  # of a Laplacian; see `LaplacianSolver.inv
 EXACT = 500  # cameras, up to which variances are exact
 PROBES = 24  # draws of errors that tell them beyond, to some 15 %
 ROUNDS = 3  # of finding the gauge
+MOST_LEVERAGE = 0.9
 TINY = np.finfo(np.float64).tiny
 
 
@@ -17,6 +18,16 @@ def strengths(problem: Problem, weights: Floats) -> Floats:
     """(n,) sums of the weights (m,) at each camera."""
     i, j = problem.edges.T
     return np.asarray(np.bincount(i, weights, problem.n) + np.bincount(j, weights, problem.n))
+
+
+def without_own_edge(problem: Problem, weights: Floats, angles: Floats) -> Floats:
+    """Residuals (m,) as if their edge had not taken part: over 1 - h, h being its weight over the sums at its cameras.
+
+    That is the leverage of the edge where its neighbours are held, and at most 0.9; the weights (m,) are positive.
+    """
+    i, j = problem.edges.T
+    sums = strengths(problem, weights)
+    return np.asarray(angles / (1 - np.minimum(weights * (1 / sums[i] + 1 / sums[j]), MOST_LEVERAGE)))
 
 
 def added_up(problem: Problem, weights: Floats, inverse: Inverse) -> Floats:

@@ -8,14 +8,13 @@ from ..descent.descent import Descent
 from ..descent.iterate import floored
 from .correlation import correlation
 from .efficiency import Fit
-from .propagation import added_up, strengths
+from .propagation import added_up, strengths, without_own_edge
 from .rivals import rival_places
 from .settling import wider_scales
 
 SIXTY_EIGHT = 1.87  # length of a standard normal vector in three dimensions that is not exceeded with 68 %
 CORRELATED = 1.4  # what covers 68 % on simulated graphs whose errors are correlated at cameras
 USUAL = 1.0  # edges of usual misfit that every camera has beside its own
-MOST_LEVERAGE = 0.9
 
 
 def camera_sigma(problem: Problem, descent: Descent, weights: Floats, fit: Fit, noise: float, vouched: bool) -> Floats:
@@ -62,11 +61,9 @@ def camera_sigma(problem: Problem, descent: Descent, weights: Floats, fit: Fit, 
 def _misfit(problem: Problem, weights: Floats, angles: Floats) -> Floats:
     """(n,) root mean square of the residuals (m,) at each camera, by weights (m,), with a share of what is usual.
 
-    Residuals are divided by 1 - h, h being the leverage of the edge: its weight over the sums at its two cameras.
+    Residuals are those of `without_own_edge`.
     """
-    i, j = problem.edges.T
     sums = strengths(problem, weights)
-    leverage = np.minimum(weights * (1 / sums[i] + 1 / sums[j]), MOST_LEVERAGE)
-    squares = strengths(problem, weights * (angles / (1 - leverage)) ** 2) / sums
+    squares = strengths(problem, weights * without_own_edge(problem, weights, angles) ** 2) / sums
     edges = sums**2 / strengths(problem, weights**2)
     return np.sqrt((edges * squares + USUAL * np.median(squares)) / (edges + USUAL))
