@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench import Floats, Instance, Ints, Problem, Source, dataset, parameter, so3, stream
 
@@ -14,7 +15,7 @@ from ._files.folders import revision
 from ._simulated.measurements import CODE, Measurements
 from ._simulated.statistics import statistics
 
-Layout = Literal["spiral", "torus", "walk"]
+Layout = Literal["spiral", "torus", "walk", "survey"]
 _TURN_DEG = 10.0  # standard deviation about each axis, from a pose to the next
 _CLOSURES = 0.2  # of a walk, for each pose
 
@@ -25,7 +26,7 @@ class Trajectory:
     """Poses in a sequence: each is measured against the next one, which is never wrong, and against earlier ones.
 
     The graphs of SLAM, in the manner of the simulated ones of Carlone, Tron, Daniilidis and Dellaert (2015): few edges
-    at a pose, no triangles or hardly any, and errors that are normal, but for loop closures between places that only
+    at a pose, triangles in a survey only, and errors that are normal, but for loop closures between places that only
     look alike. From a pose to the next the rotation changes by a random one of some 17 degrees.
 
     Parameters
@@ -35,7 +36,7 @@ class Trajectory:
     layout
         ``spiral``: laps of sqrt(n) poses, rounded; a pose also sees the one that is a lap ahead, as in sphere2500.
         ``torus``: the same, and the last lap meets the first. ``walk``: loop closures between random poses, one for
-        every five.
+        every five. ``survey``: rows of sqrt(n) poses to and fro; a pose sees the eight around it.
     noise_deg
         Standard deviation of the error about each axis, degrees.
     wrong
@@ -81,6 +82,8 @@ class Trajectory:
         elif self.layout == "torus":
             pairs = np.sort(np.stack([poses, (poses + lap) % self.n], axis=1), axis=1)
             pairs = np.concatenate([pairs, [[0, self.n - 1]]])
+        elif self.layout == "survey":
+            pairs = _around(poses // lap, np.where(poses // lap % 2, lap - 1 - poses % lap, poses % lap))
         else:
             pairs = np.stack([poses[:-lap], poses[lap:]], axis=1)
         return np.unique(pairs[np.diff(pairs)[:, 0] > 1], axis=0).astype(np.int32)
@@ -88,6 +91,14 @@ class Trajectory:
     def _name(self) -> str:
         """``spiral-n400-noise2-wrong0.1``."""
         return f"{self.layout}-n{self.n}-noise{self.noise_deg:g}-wrong{self.wrong:g}"
+
+
+def _around(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Pairs (k, 2) of points of a grid that touch, also at a corner."""
+    from scipy.spatial import KDTree
+
+    touching = KDTree(np.stack([rows, columns], axis=1)).query_pairs(1.5, output_type="ndarray")
+    return np.asarray(touching, dtype=np.int64)
 
 
 def _turning(n: int, rng: np.random.Generator) -> Floats:

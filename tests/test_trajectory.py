@@ -12,7 +12,7 @@ def made(layout: Layout = "spiral", seed: int = 0, wrong: float = 0.1, n: int = 
     return source.load()
 
 
-@pytest.mark.parametrize(("layout", "degree"), [("spiral", 3.78), ("torus", 4.0), ("walk", 2.38)])
+@pytest.mark.parametrize(("layout", "degree"), [("spiral", 3.78), ("torus", 4.0), ("walk", 2.38), ("survey", 6.84)])
 def test_every_pose_is_measured_against_the_next_and_some_earlier_ones(layout: Layout, degree: float) -> None:
     graph = made(layout)
     steps = np.diff(graph.problem.edges)[:, 0] == 1
@@ -21,6 +21,8 @@ def test_every_pose_is_measured_against_the_next_and_some_earlier_ones(layout: L
     assert graph.problem.degree.mean() == pytest.approx(degree, abs=0.06)
     if layout == "torus":
         assert set(graph.problem.degree) == {4}
+    if layout == "survey":
+        assert set(graph.problem.degree) == {3, 5, 8}
 
 
 def test_errors_are_normal_but_for_closures_that_are_wrong() -> None:
