@@ -38,10 +38,11 @@ class Consensus:
        for errors that are nearly normal, as between poses; or with Cauchy's where errors crowd near zero and are
        independent; see `efficiency`. `camera_sigma` tells how far each camera may be off; see `uncertainty`.
 
-    Where there are few triangles, less than one over an edge, as between poses, growth has only votes to go by, and a
-    camera's few edges do not tell its scale. There the solution of least absolute residuals is a start too, no scale
-    falls below that of the noise (5 degrees where there is no triangle), solutions are judged at twice of it, and in
-    the end all cameras have the scale that makes them most precise; see `common_scale`.
+    Between poses a camera's few edges do not tell its scale, and growth may have only votes to go by. Where there is
+    less than one triangle over an edge, or cameras have few edges and triangles close as if errors were normal, the
+    solution of least absolute residuals is a start too, no scale falls below that of the noise (5 degrees where there
+    is no triangle), solutions are judged at twice of it, and in the end all cameras have the scale that makes them
+    most precise; see `common_scale`.
 
     Weights and precisions multiply the weights of the edges, and so does what gravity says of them; see `prior`.
 
@@ -70,7 +71,7 @@ class Consensus:
         return Estimate(
             so3.from_quaternion(found.descent.cameras),
             edge_weights=weights,
-            camera_sigma=camera_sigma(problem, found.descent, weights, found.fit, found.noise, found.vouched),
+            camera_sigma=camera_sigma(problem, found.descent, weights, found.fit, found.noise, found.common_scale),
             iterations=found.descent.iterations,
             stop_reason="all steps done",
             cost=-found.judge.of_angles(found.descent.angles),

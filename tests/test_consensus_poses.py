@@ -1,4 +1,4 @@
-"""Consensus on graphs without triangles, such as those of poses: one scale for all cameras."""
+"""Consensus on graphs such as those of poses, few normal errors at each: one scale for all cameras."""
 
 import numpy as np
 import pytest
@@ -6,14 +6,18 @@ from graphs import errors_deg, random_edges, simulated
 
 from bench.core import so3
 from bench.core.problem import Floats, Problem
+from bench.datasets.collection_graph import CollectionGraph
+from bench.datasets.neurora_graphs import NeuRoRAGraphs
+from bench.datasets.street_graph import StreetGraph
 from bench.datasets.trajectory import Layout, Trajectory
 from bench.methods._lib.consensus.common_scale import with_common_scale
-from bench.methods._lib.consensus.evidence import closing_angles, triangles_over_edges
+from bench.methods._lib.consensus.evidence import closing_angles, errors_are_normal, triangles_over_edges
 from bench.methods._lib.consensus.half_edges import HalfEdges
 from bench.methods._lib.consensus.settling import Settling
 from bench.methods._lib.descent.descent import Descent
 from bench.methods.consensus import Consensus
 from bench.methods.l1_irls import L1IRLS
+from bench.plugins.declare import Dataset, Source
 
 RNG = np.random.default_rng(0)  # the methods draw nothing from it
 FIRST, WIDEST = np.radians(5), np.radians(20)
@@ -49,8 +53,32 @@ def test_triangles_are_counted_over_edges() -> None:
         assert triangles_over_edges(half, problem.m, closing_angles(half, problem.m)) == pytest.approx(wanted)
 
 
-def test_normal_errors_of_few_edges_are_averaged_as_by_least_squares() -> None:
-    problem, truth = poses("torus", 144, noise_deg=3, wrong=0)
+def closes_as_normal(problem: Problem) -> bool:
+    return errors_are_normal(closing_angles(HalfEdges.of(problem), problem.m))
+
+
+@pytest.mark.parametrize("wrong", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("noise_deg", [0.5, 3.0])
+def test_triangles_tell_that_errors_are_normal(noise_deg: float, wrong: float) -> None:
+    assert closes_as_normal(poses("survey", 225, noise_deg, wrong)[0])
+
+
+@pytest.mark.parametrize("dataset", [CollectionGraph(n=60), StreetGraph(n=80), NeuRoRAGraphs(60, 100)])
+def test_triangles_tell_that_some_cameras_err_more_than_others(dataset: Dataset) -> None:
+    for seed in range(3):
+        (source,) = dataset.sources(None, seed)
+        assert isinstance(source, Source)
+        assert not closes_as_normal(source.load().problem)
+
+
+def test_no_triangles_or_exact_ones_tell_nothing() -> None:
+    assert not closes_as_normal(poses("torus", 64, noise_deg=1, wrong=0)[0])
+    assert not closes_as_normal(poses("survey", 225, noise_deg=0, wrong=0.1)[0])
+
+
+@pytest.mark.parametrize("layout", ["torus", "survey"])
+def test_normal_errors_of_few_edges_are_averaged_as_by_least_squares(layout: Layout) -> None:
+    problem, truth = poses(layout, 144, noise_deg=3, wrong=0)
     least = least_squares(problem, truth, np.ones(problem.m))
     assert errors_deg(Consensus().solve(problem, RNG).rotations, truth).mean() < 1.02 * least
 
@@ -67,7 +95,7 @@ def test_wrong_edges_cost_little_more_than_leaving_them_out(turned_deg: float) -
     assert settled(problem, truth) < 1.1 * least_squares(problem, truth, np.where(wrong, 1e-9, 1.0))
 
 
-@pytest.mark.parametrize("layout", ["torus", "spiral"])
+@pytest.mark.parametrize("layout", ["torus", "spiral", "survey"])
 def test_wrong_loop_closures_do_not_mislead(layout: Layout) -> None:
     errors = []
     for seed in range(3):
@@ -77,10 +105,11 @@ def test_wrong_loop_closures_do_not_mislead(layout: Layout) -> None:
     assert ours < 0.9 * others
 
 
-def test_standard_errors_hold_what_they_say() -> None:
+@pytest.mark.parametrize("layout", ["torus", "survey"])
+def test_standard_errors_hold_what_they_say(layout: Layout) -> None:
     within = []
     for seed in range(3):
-        problem, truth = poses("torus", 144, noise_deg=2, wrong=0.1, seed=seed)
+        problem, truth = poses(layout, 144, noise_deg=2, wrong=0.1, seed=seed)
         estimate = Consensus().solve(problem, RNG)
         assert estimate.camera_sigma is not None
         ratio = np.radians(errors_deg(estimate.rotations, truth)) / estimate.camera_sigma

@@ -20,7 +20,7 @@ LAYOUTS = "photo-collection[n=120,layout=[facade,square,street,rooms,orbit,aeria
 SIMULATED = {
     "independent, as in the paper": ("erdos-renyi[n=[100,200],missing=[0.5,0.8]]", range(4)),
     "independent, normal": ("erdos-renyi[n=100,missing=[0.5,0.8],noise=tangent,noise_deg=2,outliers=0.2]", range(4)),
-    "trajectories": ("trajectory[layout=[spiral,torus,walk],wrong=[0.0,0.1]]", range(4)),
+    "trajectories": ("trajectory[layout=[spiral,torus,walk,survey],wrong=[0.0,0.1]]", range(4)),
     "correlated (street-graph)": ("street-graph[n=200,layout=[street,square]]", range(8)),
 }
 MEASURED = {"1DSfM": ("1dsfm", range(1))}

@@ -14,6 +14,10 @@ FEWEST, SAMPLE = 16, 8  # triangles over an edge: at least, where there are; and
 BINS = 3600  # of the histogram of angles, up to 180 degrees
 QUANTILE, FACTOR = 0.02, 2.0
 NARROWEST, WIDEST, UNKNOWN = np.radians([0.2, 6.0, 5.0])
+INNER, OUTER = 3.0, 6.0  # sigma
+FIFTH = 1.005  # sigma, below which a fifth of normal vectors in three dimensions are
+NORMAL, FEWEST_INNER = 0.1, 100  # of the angles up to three sigma, at most so many are between three and six
+ROUNDS, SETTLED = 50, 1e-3  # of finding sigma
 
 
 def closing_angles(half: HalfEdges, m: int) -> Ints:
@@ -40,6 +44,28 @@ def noise_scale(histogram: Ints) -> float:
     cumulated = np.cumsum(histogram)
     place = np.interp(QUANTILE * cumulated[-1], np.concatenate([[0], cumulated]), np.arange(BINS + 1))
     return float(np.clip(FACTOR * place * np.pi / BINS, NARROWEST, WIDEST))
+
+
+def errors_are_normal(histogram: Ints) -> bool:
+    """Whether triangles of that histogram close as those of independent normal errors do, or do not close at all.
+
+    Sigma is such that of the angles below three sigma a fifth is as small as it would be of normal errors, which
+    wrong triangles hardly change. Of normal ones 3 % are then between three and six sigma, up to 10 % with 30 % of the
+    edges wrong; between photographs, some of which err much more than others, a quarter and more.
+    """
+    cumulated = np.concatenate([[0], np.cumsum(histogram)])
+    places = np.arange(BINS + 1)
+
+    def below(place: float) -> float:
+        return float(np.interp(place, places, cumulated))
+
+    sigma = BINS / INNER
+    for _ in range(ROUNDS):
+        before, sigma = sigma, float(np.interp(below(INNER * sigma) / 5, cumulated, places)) / FIFTH
+        if abs(sigma - before) < SETTLED * before:
+            break
+    inner = below(INNER * sigma)
+    return inner >= FEWEST_INNER and below(OUTER * sigma) - inner < NORMAL * inner
 
 
 def support_by_triangles(half: HalfEdges, m: int, scales: Floats) -> Floats:

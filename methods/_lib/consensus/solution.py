@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import Floats, Problem, so3
+from bench import Floats, Ints, Problem, so3
 
 from ..descent.descent import Descent
 from ..descent.losses import LOSSES
@@ -13,12 +13,12 @@ from ..linear.spectral import spectral_rotations
 from ..starts import TOLERANCE
 from .common_scale import with_common_scale
 from .efficiency import Fit, most_precise
-from .evidence import closing_angles, noise_scale, support_by_triangles, triangles_over_edges
+from .evidence import closing_angles, errors_are_normal, noise_scale, support_by_triangles, triangles_over_edges
 from .growth import grown
 from .half_edges import HalfEdges
 from .prior import prior_weights
 from .recombination import Judge, recombined
-from .settling import Settling
+from .settling import SHARE, Settling
 
 AGREEING = 5  # edges that are to agree with a camera
 FACTORS = (0.5, 1.0, 2.0, 4.0)  # of the noise scale, at which solutions are grown
@@ -30,7 +30,7 @@ START_DEG, START = 8.0, 4.0  # where the scales of the cameras begin to fall; th
 STEPS_OF_L1, ENOUGH = 10, np.radians(0.057)  # of least absolute residuals, and the step that is the last
 STEPS = 12  # of least squares, for each solution that was grown and for the final one
 TOGETHER_DEG = 2.0  # where the scales of the final one begin
-JUDGED, JUDGED_UNVOUCHED = 0.5, 2.0  # noise scales at which solutions are compared
+JUDGED, JUDGED_WIDE = 0.5, 2.0  # noise scales at which solutions are compared
 APART = 4.0  # noise scales by which pieces stand elsewhere
 
 
@@ -48,8 +48,8 @@ class Solution:
         The loss that it is settled with.
     noise
         The noise scale, radians.
-    vouched
-        Whether there are triangles that vouch for edges.
+    common_scale
+        Whether all cameras have one scale, see `_need_common_scale`.
     note
         How it came about, in words.
     """
@@ -59,7 +59,7 @@ class Solution:
     descent: Descent
     fit: Fit
     noise: float
-    vouched: bool
+    common_scale: bool
     note: str
 
     def weights(self, angles: Floats) -> Floats:
@@ -71,12 +71,12 @@ def solution(problem: Problem, agreeing: int = AGREEING) -> Solution:
     """Where the cameras come to rest; the steps are those of `Consensus`."""
     half = HalfEdges.of(problem)
     closing = closing_angles(half, problem.m)
-    noise, vouched = noise_scale(closing), triangles_over_edges(half, problem.m, closing) >= ENOUGH_TRIANGLES
-    judged, narrowest = (JUDGED * noise, 0.0) if vouched else (JUDGED_UNVOUCHED * noise, noise)
+    noise, common = noise_scale(closing), _need_common_scale(problem, half, closing, agreeing)
+    judged, narrowest = (JUDGED_WIDE * noise, noise) if common else (JUDGED * noise, 0.0)
     prior = prior_weights(problem, noise)
     settling, judge = Settling(problem, half, prior, agreeing), Judge(problem, judged)
     starts = [so3.from_quaternion(start) for start in _starts(problem, half, prior, noise)]
-    starts += [] if vouched else [_least_absolute(problem)]
+    starts += [_least_absolute(problem)] if common else []
     widest = max(np.radians(START_DEG), START * noise)
     settled = [_settled(problem, settling, start, widest, narrowest) for start in starts]
     settled.sort(key=lambda descent: -judge.of_angles(descent.angles))
@@ -85,14 +85,25 @@ def solution(problem: Problem, agreeing: int = AGREEING) -> Solution:
         cameras, taken = recombined(judge, cameras, other.cameras, APART * noise)
         pieces += taken
     final = Descent(problem, so3.from_quaternion(cameras), 0.0)
-    if vouched:
-        fit = most_precise(problem, settling, final, settling.settle(final, np.radians(TOGETHER_DEG), STEPS))
-    else:
+    if common:
         fit = with_common_scale(problem, settling, final, noise, widest)
+    else:
+        fit = most_precise(problem, settling, final, settling.settle(final, np.radians(TOGETHER_DEG), STEPS))
     note = f"best of {len(settled)} solutions"
     note += f"; {pieces} piece{'s' * (pieces > 1)} of others taken over" if pieces else ""
-    note += "" if vouched else "; one scale for all cameras, as there are few triangles"
-    return Solution(settling, judge, final, fit, noise, vouched, note)
+    note += "; one scale for all cameras" if common else ""
+    return Solution(settling, judge, final, fit, noise, common, note)
+
+
+def _need_common_scale(problem: Problem, half: HalfEdges, closing: Ints, agreeing: int) -> bool:
+    """Whether the scales of single cameras tell nothing.
+
+    So it is where no triangles vouch for edges, and where errors are normal and cameras have so few edges that fewer
+    than `agreeing` must agree: the smallest scale at which two or three do is then a matter of chance.
+    """
+    if triangles_over_edges(half, problem.m, closing) < ENOUGH_TRIANGLES:
+        return True
+    return bool(SHARE * problem.degree.mean() < agreeing) and errors_are_normal(closing)
 
 
 def _starts(problem: Problem, half: HalfEdges, prior: Floats, noise: float) -> list[Floats]:

@@ -17,7 +17,9 @@ CORRELATED = 1.4  # what covers 68 % on simulated graphs whose errors are correl
 USUAL = 1.0  # edges of usual misfit that every camera has beside its own
 
 
-def camera_sigma(problem: Problem, descent: Descent, weights: Floats, fit: Fit, noise: float, vouched: bool) -> Floats:
+def camera_sigma(
+    problem: Problem, descent: Descent, weights: Floats, fit: Fit, noise: float, common_scale: bool
+) -> Floats:
     """(n,) angle in radians below which a camera's error is expected with probability 68 %; below twice it with 95 %.
 
     Were errors independent, it would be 1.87 f_i e_i: e_i is the standard error along an axis with the neighbours held,
@@ -25,8 +27,8 @@ def camera_sigma(problem: Problem, descent: Descent, weights: Floats, fit: Fit, 
     point the same way (wrong focal length, one-sided matches) more edges do not help it, and what they have in common
     adds up faster along a sequence: 1.4 f_i^2 q_i, q_i being the root mean square of the residuals of the edges that
     agree with it. How probable that is, p, follows from the residuals outside (`correlation`), and the result is the
-    first to the power 1 - p times the second to the power p. Where there are few triangles p is zero: it is pictures
-    whose errors point the same way, and their graphs have triangles.
+    first to the power 1 - p times the second to the power p. Where all cameras have one scale p is zero: it is
+    pictures whose errors point the same way, and their triangles do not close as if errors were normal.
 
     A camera may also stand wrong with its whole piece (`rivals`): where a place at an angle t has a chance of
     5 %, the 95 % radius reaches there, and where of 32 %, the 68 % radius does. What no measurement contradicts, such
@@ -42,15 +44,15 @@ def camera_sigma(problem: Problem, descent: Descent, weights: Floats, fit: Fit, 
         The loss there, with e_i as its errors.
     noise
         The noise scale, radians.
-    vouched
-        Whether there are triangles that vouch for edges.
+    common_scale
+        Whether all cameras have one scale.
     """
     weights = floored(weights)
     further = added_up(problem, weights, descent.inverse(weights))
     alone = SIXTY_EIGHT * further * fit.errors
     common = CORRELATED * further**2 * _misfit(problem, weights, descent.angles)
     wider = wider_scales(problem.edges, fit.scales)
-    chance = correlation(problem, descent.vectors, descent.angles, wider) if vouched else 0.0
+    chance = 0.0 if common_scale else correlation(problem, descent.vectors, descent.angles, wider)
     near = np.minimum(alone ** (1 - chance) * np.maximum(alone, common) ** chance, np.pi)
     agreement = 1 / (1 + (descent.angles / wider) ** 2) ** fit.power
     probable, possible = rival_places(problem, descent.vectors, descent.angles, agreement, noise, descent.inverse)
