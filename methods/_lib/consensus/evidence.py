@@ -11,6 +11,7 @@ from .half_edges import HalfEdges
 
 BUDGET = 8_000_000  # triangles looked at
 FEWEST, SAMPLE = 16, 8  # triangles over an edge: at least, where there are; and those that tell the noise
+MOST_SCALES = 4  # a number that the compiler knows, so that it takes them at once
 BINS = 3600  # of the histogram of angles, up to 180 degrees
 QUANTILE, FACTOR = 0.02, 2.0
 NARROWEST, WIDEST, UNKNOWN = np.radians([0.2, 6.0, 5.0])
@@ -23,7 +24,7 @@ ROUNDS, SETTLED = 50, 1e-3  # of finding sigma
 def closing_angles(half: HalfEdges, m: int) -> Ints:
     """Histogram (BINS,), up to 180 degrees, of the angles by which triangles do not close: up to 8 over each edge."""
     histogram = np.zeros(BINS, dtype=np.int32)
-    _visit(half, SAMPLE, np.zeros(0), np.zeros((m, 0)), histogram)
+    _visit(half, SAMPLE, np.zeros(0), np.zeros((0, MOST_SCALES)), histogram)
     return histogram
 
 
@@ -77,18 +78,19 @@ def support_by_triangles(half: HalfEdges, m: int, scales: Floats) -> Floats:
     Parameters
     ----------
     scales
-        (k,) values of s, radians.
+        (k,) values of s, radians; at most four.
     """
-    support = np.zeros((m, len(scales)))
+    support = np.zeros((m, MOST_SCALES))
     _visit(half, max(FEWEST, BUDGET // m), scales, support, np.zeros(0, dtype=np.int32))
-    return np.ascontiguousarray(support.T)
+    return np.ascontiguousarray(support[:, : len(scales)].T)
 
 
 def _visit(half: HalfEdges, most: int, scales: Floats, support: Floats, histogram: Ints) -> None:
     """Visit up to `most` triangles over each edge; see `_visit_triangles`."""
-    whole = _whole(half, most)
+    whole, inverse = _whole(half, most), np.zeros(MOST_SCALES)
+    inverse[: len(scales)] = 1 / scales**2
     _visit_triangles(
-        half.ranks, half.first, half.others, half.ids, half.quaternions, most, whole, scales, support, histogram
+        half.ranks, half.first, half.others, half.ids, half.quaternions, most, whole, inverse, support, histogram
     )
 
 
@@ -105,7 +107,7 @@ def _visit_triangles(
     quaternions: Floats,
     most: int,
     whole: bool,
-    scales: Floats,
+    inverse: Floats,
     support: Floats,
     histogram: Ints,
 ) -> None:
@@ -118,14 +120,14 @@ def _visit_triangles(
     whole
         Whether every edge has at most so many: a triangle then counts for its three edges when that between the two
         cameras of highest rank is visited, and otherwise for the visited edge alone.
-    scales, support
-        (k,) and (m, k): what triangles that close at each scale add to.
+    inverse, support
+        (4,) s^-2, and (m, 4) what triangles that close at each scale s add to; none where m is zero.
     histogram
         (b,) what their angles add to, bins of equal width up to pi; none where b is zero.
     """
-    n, bins = len(first) - 1, len(histogram)
+    n, bins, vouching = len(first) - 1, len(histogram), len(support) > 0
     place = np.full(n, -1, dtype=np.int32)
-    inverse, own = 1 / scales**2, np.zeros(len(scales))
+    own = np.zeros(MOST_SCALES)
     for i in range(n):
         for a in range(first[i], first[i + 1]):
             place[others[a]] = a
@@ -154,17 +156,20 @@ def _visit_triangles(
                 if bins > 0:
                     angle = 4 * math.asin(math.sqrt(square) / 4)
                     histogram[min(int(angle / math.pi * bins), bins - 1)] += 1
-                for k in range(len(scales)):
-                    share = 1 / (1 + square * inverse[k])
-                    share *= share
-                    own[k] += share
-                    if whole:
-                        support[ids[b], k] += share
-                        support[ids[c], k] += share
+                if vouching:
+                    second, third = ids[b], ids[c]
+                    for k in range(MOST_SCALES):
+                        share = 1 / (1 + square * inverse[k])
+                        share *= share
+                        own[k] += share
+                        if whole:
+                            support[second, k] += share
+                            support[third, k] += share
                 count += 1
                 if count == most and not whole:
                     break
-            for k in range(len(scales)):
-                support[ids[a], k] += own[k]
+            if vouching:
+                for k in range(MOST_SCALES):
+                    support[ids[a], k] += own[k]
         for a in range(first[i], first[i + 1]):
             place[others[a]] = -1
