@@ -44,8 +44,9 @@ class PoGONet(Learned, Warm):
        g_ij / (1 + (angle / s)^2)^2. The scale s falls from 20 degrees to half the noise scale that triangles tell.
 
     With gates of one half everywhere, as before any training, this is the Geman-McClure loss with an annealed scale.
-    No world frame is used, so that nothing has to be pinned. Trained on simulated graphs with correlated errors, by the
-    joint loss of `Joint`: absolute errors, relative errors, and which edges are outliers.
+    No world frame is used, so that nothing has to be pinned. Trained on simulated graphs with correlated errors and on
+    random ones with normal errors, by the joint loss of `Joint`: absolute errors, relative errors, and which edges are
+    outliers.
     """
 
     start: ClassVar[str] = "spectral"
