@@ -17,7 +17,7 @@ from ._lib.learned.lits import network
     requires=("scipy",),
     supervised=True,
     robust=True,
-    exact_to_deg=40,  # of a ring or a tree; it has learned from graphs with many triangles
+    exact_to_deg=180,  # nothing: of a ring or a tree it has not learned, but from graphs with many triangles
     invariant_to_deg=None,
 )
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class LITS(Learned):
     parameters); Adam with rate 0.002 for RMSprop with 0.0003; the weights are a running mean of those of the last
     steps; some 106,000 steps for 200,000.
 
-    It is not exact. On noise-free graphs of the kind it learned from, most cameras are within 0.2 degrees; long rings,
-    trees, and cameras turned as no photographer turns them, may be off by tens of degrees. What is seldom in training,
-    such as a piece of a scene that hangs on to the rest by few right edges, may end far from where it belongs.
+    It is not exact. On noise-free graphs of real topologies most cameras are within 0.2 degrees; rings, trees and
+    graphs of which it has seen few may be off by any angle. So may a piece of a scene that hangs on to the rest by few
+    right edges.
     """
 
     learns_from = (

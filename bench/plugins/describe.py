@@ -138,10 +138,10 @@ def _promises(declared: Mapping[str, Any]) -> list[str]:
     """What `check` and the tests hold a method to; nothing of a dataset."""
     if "deterministic" not in declared:
         return []
-    moved = declared["invariant_to_deg"]
+    moved, exact = declared["invariant_to_deg"], declared["exact_to_deg"]
     return [
         "the same answer whatever the seed" if declared["deterministic"] else "another answer under another seed",
-        f"small noise-free problems recovered to {declared['exact_to_deg']:g}°",
+        f"small noise-free problems recovered to {exact:g}°" if exact < 180 else "nothing of small noise-free problems",
         f"relabelling, permuting, reversing and turning move its answer by {moved:g}° at most"
         if moved is not None
         else "nothing of relabelling, permuting, reversing and turning",
