@@ -26,8 +26,8 @@ class Trajectory:
     """Poses in a sequence: each is measured against the next one, which is never wrong, and against earlier ones.
 
     The graphs of SLAM, in the manner of the simulated ones of Carlone, Tron, Daniilidis and Dellaert (2015): few edges
-    at a pose, triangles in a survey only, and errors that are normal, but for loop closures between places that only
-    look alike. From a pose to the next the rotation changes by a random one of some 17 degrees.
+    at a pose, hardly any triangles but in a survey, and errors that are normal, but for loop closures between places
+    that only look alike. From a pose to the next the rotation changes by a random one of some 17 degrees.
 
     Parameters
     ----------

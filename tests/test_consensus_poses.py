@@ -14,6 +14,7 @@ from bench.methods._lib.consensus.common_scale import with_common_scale
 from bench.methods._lib.consensus.evidence import closing_angles, errors_are_normal, triangles_over_edges
 from bench.methods._lib.consensus.half_edges import HalfEdges
 from bench.methods._lib.consensus.settling import Settling
+from bench.methods._lib.consensus.solution import solution
 from bench.methods._lib.descent.descent import Descent
 from bench.methods.consensus import Consensus
 from bench.methods.l1_irls import L1IRLS
@@ -74,6 +75,14 @@ def test_triangles_tell_that_some_cameras_err_more_than_others(dataset: Dataset)
 def test_no_triangles_or_exact_ones_tell_nothing() -> None:
     assert not closes_as_normal(poses("torus", 64, noise_deg=1, wrong=0)[0])
     assert not closes_as_normal(poses("survey", 225, noise_deg=0, wrong=0.1)[0])
+
+
+def test_cameras_have_scales_of_their_own_where_many_edges_tell_them() -> None:
+    few, (dense, _) = poses("survey", 144, noise_deg=2, wrong=0)[0], simulated(random_edges(40, 0.6), noise_deg=2)
+    assert closes_as_normal(dense)
+    assert dense.degree.mean() > 17
+    assert np.ptp(solution(few).fit.scales) == 0
+    assert np.ptp(solution(dense).fit.scales) > 0
 
 
 @pytest.mark.parametrize("layout", ["torus", "survey"])

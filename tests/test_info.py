@@ -35,6 +35,7 @@ def test_a_method_in_words() -> None:
     assert found.facts["uses"] == "edges and rotations, weights, precisions"
     assert found.facts["requires"] == "scipy, numba (installed)"
     assert "recovered to 1e-06°" in found.facts["promises"]
+    assert "nothing of small noise-free problems" in described(catalog("method")["lits"]).facts["promises"]
     assert list(found.references) == ["chatterjee2018"]
     assert described(catalog("method")["dmf-synch"]).parameters[2].takes == "a whole number or none, at least 2"
 
