@@ -124,11 +124,11 @@ class CRDMF(Presets):
         return self.preset == "thin" and self.init not in SEEDED
 
     @property
-    def exact_to_deg(self) -> float:
+    def exact_to_deg(self) -> float | None:
         """From a random start a candidate may wind around a ring; one of ten does not. The paper's step never falls."""
         if self.preset == "paper":
-            return 2.0 if self.candidates in (None, len(DEPTHS)) else 180.0
-        return 180.0 if self.init == "random" else 0.01
+            return 2.0 if self.candidates in (None, len(DEPTHS)) else None
+        return None if self.init == "random" else 0.01
 
     @property
     def max_cameras(self) -> int | None:

@@ -154,18 +154,21 @@ class DMFSynch(Presets):
         return self.preset == "thin" and self.init not in SEEDED and (self.width or 3) == 3
 
     @property
-    def exact_to_deg(self) -> float:
+    def exact_to_deg(self) -> float | None:
         """From a random start it may wind around a ring; the dense form keeps oscillating on small graphs."""
         if self.preset != "thin":
             return 2.0
-        return 180.0 if self.init == "random" else 0.01
+        return None if self.init == "random" else 0.01
 
     @property
     def invariant_to_deg(self) -> float | None:
-        """The entry-wise l1 loss depends on the frames of the cameras; a random start is drawn by label."""
-        if self.preset != "thin" or self.init == "random":
-            return None
-        return 1.0 if self.loss == "l1" else 0.01
+        """Nothing from a random start, which is drawn by label."""
+        return 0.01 if self.preset == "thin" and self.init != "random" else None
+
+    @property
+    def depends_on_frames(self) -> bool:
+        """The entry-wise l1 loss does."""
+        return self.loss == "l1"
 
     def warm_up(self) -> None:
         """Compile the kernels and load what `solve` imports."""

@@ -24,7 +24,8 @@ from ._lib.warm_up import solved_once
     robust=True,
     simple_graph=True,
     uses=("weights", "precisions", "gravity"),
-    invariant_to_deg=None,  # it has learned how cameras are held, so that their frames matter; labels do not
+    invariant_to_deg=5e-4,
+    depends_on_frames=True,  # it has learned how cameras are held
 )
 @dataclass(frozen=True)
 class LearnedConsensus(Learned):

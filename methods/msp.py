@@ -22,7 +22,8 @@ from ._lib.warm_up import Warm
     supervised=True,
     robust=True,
     simple_graph=True,
-    invariant_to_deg=None,
+    invariant_to_deg=5e-4,
+    depends_on_frames=True,  # it has learned how cameras are held
 )
 @dataclass(frozen=True)
 class MSP(Learned, Warm):

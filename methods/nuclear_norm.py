@@ -24,7 +24,7 @@ ENTRY_STEP = 0.2  # threshold of an entry of E in one iteration, which sets the 
     robust=True,
     simple_graph=True,  # X has one block for each pair
     max_cameras=500,
-    invariant_to_deg=2.0,  # entrywise misfits: what turning the frames does to two degrees of noise
+    depends_on_frames=True,  # entrywise misfits
 )
 @dataclass(frozen=True)
 class NuclearNorm(Seeded):

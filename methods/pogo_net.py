@@ -24,7 +24,7 @@ RECONSTRUCTED = "reconstructed from what is said of PoGO-Net: neither its code n
     supervised=True,
     robust=True,
     simple_graph=True,
-    invariant_to_deg=None,
+    invariant_to_deg=5e-4,
 )
 @dataclass(frozen=True)
 class PoGONet(Learned, Warm):

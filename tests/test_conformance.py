@@ -103,6 +103,20 @@ def test_dependence_on_labels_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
         assert (finding.check, finding.result) == ("relabelled cameras", result)
 
 
+def test_what_is_not_promised_is_skipped_but_an_answer_is_required(
+    faulty_plugin: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bench.running.conformance.CHECKS", CHECKS[:6])
+    info = catalog("method", [faulty_plugin])["faulty"]
+    promising_nothing = replace(info, facts={**info.facts, "exact_to_deg": None})
+    skipped = list(check_method(promising_nothing, {"fault": "fine"}))
+    assert {(f.result, f.detail) for f in skipped} == {
+        ("skipped", "the method does not promise it of noise-free problems")
+    }
+    unsolved = list(check_method(promising_nothing, {"fault": "some-nan"}))
+    assert {f.result for f in unsolved} == {"failed"}
+
+
 def failed(plugin: Path, fault: str) -> set[str]:
     info = catalog("method", [plugin])["faulty"]
     return {f.check for f in check_method(info, {"fault": fault}) if f.result == "failed"}

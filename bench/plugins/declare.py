@@ -177,11 +177,12 @@ def method(
     certifies: bool = False,
     deterministic: bool = True,
     max_cameras: int | None = None,
-    exact_to_deg: float = 1e-6,
+    exact_to_deg: float | None = 1e-6,
     invariant_to_deg: float | None = 1e-3,
     uses: tuple[Information, ...] = (),
     simple_graph: bool = False,
     depends_on_labels: bool = False,
+    depends_on_frames: bool = False,
 ) -> Callable[[T], T]:
     """Declare a frozen dataclass with a `solve` method as a method.
 
@@ -203,10 +204,10 @@ def method(
     max_cameras
         The largest problem it is meant for; larger ones become ``skipped`` rows.
     exact_to_deg
-        How closely it promises to recover small noise-free problems.
+        How closely it promises to recover small noise-free problems; None promises nothing.
     invariant_to_deg
-        How far relabelling cameras, permuting or reversing edges and turning frames may move its answer to a small
-        noisy problem; None promises nothing.
+        How far relabelling cameras, permuting or reversing edges and turning the frames of cameras, all by one
+        rotation, may move its answer to a small noisy problem; None promises nothing.
     uses
         What it takes of what comes with the measurements: any of "weights", "precisions" and "gravity". The rest is
         not given to it, so that a row never depends on what its table does not say.
@@ -215,6 +216,9 @@ def method(
     depends_on_labels
         Whether its answer depends on the names of the cameras, in ways that no seed of its own governs: from the second
         seed on they are permuted, so that the spread over seeds shows how much.
+    depends_on_frames
+        Whether turning frames may move its answer by any angle, as where it has learned how cameras are held or judges
+        matrices entry by entry: `invariant_to_deg` then says nothing of it.
     """
     facts = {
         "install": install,
@@ -229,6 +233,7 @@ def method(
         "uses": uses,
         "simple_graph": simple_graph,
         "depends_on_labels": depends_on_labels,
+        "depends_on_frames": depends_on_frames,
     }
     return _declare("method", name, title, cite, requires, facts, "solve")
 

@@ -33,9 +33,9 @@ class Started(Seeded):
     """Promises of a method that depend on its start: a random one may end in another local minimum."""
 
     @property
-    def exact_to_deg(self) -> float:
-        """Of no use (180) from a random start."""
-        return 180.0 if self.init == "random" else 1e-6
+    def exact_to_deg(self) -> float | None:
+        """Nothing from a random start."""
+        return None if self.init == "random" else 1e-6
 
     @property
     def invariant_to_deg(self) -> float | None:
@@ -54,7 +54,7 @@ class Refined(Started):
         return False
 
     @property
-    def exact_to_deg(self) -> float:
+    def exact_to_deg(self) -> float | None:
         """From a random start only as near as the last step tells."""
         return self.tolerance_deg if self.init == "random" else 1e-6
 
