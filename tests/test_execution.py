@@ -19,9 +19,12 @@ LIMITS = Limits(seconds=30, memory_gib=1.0)
 
 def solve(plugin: Path, fault: str, limits: Limits = LIMITS, mark: str = "", seed: int = 0) -> Answer:
     info = catalog("method", [plugin])["faulty"]
-    problem = Problem(3, np.array([(0, 1), (0, 2), (1, 2)]), np.tile(np.eye(3), (3, 1, 1)))
     with SingleSolver(info, {"fault": fault, "mark": mark}, limits) as solver:
-        return solver.solve(problem, seed)
+        return solver.solve(triangle(), seed)
+
+
+def triangle() -> Problem:
+    return Problem(3, np.array([(0, 1), (0, 2), (1, 2)]), np.tile(np.eye(3), (3, 1, 1)))
 
 
 @pytest.mark.parametrize(
@@ -104,12 +107,70 @@ def test_without_fork_a_fresh_interpreter_does_the_same(faulty_plugin: Path, mon
     assert solve(faulty_plugin, "segfault").outcome.text == "crashed(SIGSEGV)"
 
 
+WARM = '''
+"""Tells which processes warm up and which solve; something may be wrong with the second that warms up."""
+import os, time
+from dataclasses import dataclass
+from pathlib import Path
+import numpy as np
+from bench import method
+
+
+@method("warm", title="Warm", requires=REQUIRES)
+@dataclass(frozen=True)
+class Warm:
+    mark: str = ""
+    fault: str = ""
+
+    def tell(self, what):
+        with open(self.mark, "a") as file:
+            file.write(f"{what} {os.getpid()}\\n")
+
+    def warm_up(self):
+        self.tell("warm")
+        if Path(self.mark).read_text().count("warm") == 2:
+            time.sleep(60 if self.fault == "endless" else 0)
+            assert self.fault != "raises"
+
+    def solve(self, problem, rng):
+        self.tell("solve")
+        return np.tile(np.eye(3), (problem.n, 1, 1))
+'''
+
+
+def warmed(folder: Path, requires: tuple[str, ...], fault: str = "") -> tuple[list[str], set[str]]:
+    """What was done for three jobs, one after another, and the processes that warmed up but solved nothing."""
+    plugin, mark = folder / "warm.py", folder / "mark"
+    plugin.write_text(WARM.replace("REQUIRES", repr(requires)))
+    with SingleSolver(catalog("method", [plugin])["warm"], {"mark": str(mark), "fault": fault}, LIMITS) as solver:
+        for _ in range(3):
+            solver._warm_up = True
+            assert solver.solve(triangle()).outcome.text == "ok"
+    done = [line.split() for line in mark.read_text().splitlines()]
+    processes = {what: {process for did, process in done if did == what} for what in ("warm", "solve")}
+    return [what for what, _ in done], processes["warm"] - processes["solve"]
+
+
+@pytest.mark.skipif(not launch.CAN_FORK, reason="there is no fork here")
+@pytest.mark.parametrize("fault", ["", "endless", "raises"])
+def test_the_server_warms_up_once_after_the_first_job(tmp_path: Path, fault: str) -> None:
+    did, servers = warmed(tmp_path, ("scipy",), fault)
+    assert did == ["warm", "solve", "warm", "warm", "solve", "warm", "solve"]
+    assert len(servers) == 1
+
+
+def test_the_server_does_not_warm_up_what_may_start_threads(tmp_path: Path) -> None:
+    did, servers = warmed(tmp_path, ("scipy", "pandas"))
+    assert did == 3 * ["warm", "solve"]
+    assert servers == set()
+
+
 def test_a_server_that_dies_is_replaced(faulty_plugin: Path) -> None:
     info = catalog("method", [faulty_plugin])["faulty"]
     problem = Problem(2, np.array([(0, 1)]), np.eye(3)[None])
     with SingleSolver(info, {}, LIMITS) as solver:
         assert solver.solve(problem).outcome.text == "ok"
-        server = solver.launcher.servers[()]
+        server = solver.launcher.servers[frozenset()]
         os.kill(server.process.pid, 9)
         server.reader.join(timeout=10)
         assert solver.solve(problem).outcome.text == "ok"

@@ -94,7 +94,7 @@ def test_a_job_that_loses_its_server_is_started_again(marks: Path, starts: Path)
         thread.start()
         while not list(marks.iterdir()):
             time.sleep(0.01)
-        os.kill(alone.launcher.servers[()].process.pid, signal.SIGKILL)
+        os.kill(alone.launcher.servers[frozenset()].process.pid, signal.SIGKILL)
         thread.join()
     assert answers[0].outcome.text == "timeout(4 s)"
     assert len(starts.read_text().splitlines()) == 2

@@ -71,7 +71,7 @@ class Launcher:
     def __init__(self, threads: int) -> None:
         self.threads = threads
         self.environment = os.environ | {name: str(threads) for name in THREAD_VARIABLES}
-        self.servers: dict[tuple[str, ...], _ForkServer] = {}
+        self.servers: dict[frozenset[str], _ForkServer] = {}
         self.lock = threading.Lock()
 
     def start(self, request: Request, requires: tuple[str, ...]) -> Child:
@@ -87,12 +87,12 @@ class Launcher:
         if not CAN_FORK:
             return FreshInterpreter(request, self.environment)
         with self.lock:
-            server = self.servers.get(requires)
+            server = self.servers.get(libraries := frozenset(requires))
             if server is not None and not server.alive:
                 server.close()
                 server = None
             if server is None:
-                server = self.servers[requires] = _ForkServer(requires, self.threads, self.environment)
+                server = self.servers[libraries] = _ForkServer(requires, self.threads, self.environment)
         return server.start(request)
 
     def close(self) -> None:

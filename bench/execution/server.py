@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from bench.execution import processes
 from bench.execution.log import Tail
+from bench.execution.warmth import Warmth
 
 if TYPE_CHECKING:
     from bench.execution import child
@@ -94,9 +95,10 @@ def _rehearse(threads: int) -> None:
 
 @dataclass
 class _Job:
-    """A job that runs: its number, its process, the pipe that it prints to, and when to kill it, if it is to end."""
+    """A job that runs: its number and request, its process, the pipe it prints to, and when to kill it, if it is to."""
 
     number: int
+    request: dict[str, Any]
     pid: int
     pipe: int
     log: Tail = field(default_factory=Tail)
@@ -117,6 +119,7 @@ class _Server:
         self.connection = connection
         self.pending = b""
         self.jobs: dict[int, _Job] = {}  # by pid
+        self.warmth = Warmth()
         self.helpers = set(processes.children(os.getpid()))  # that libraries have started
         self.prctl = _prctl()
         self.prctl(_SET_CHILD_SUBREAPER, 1)
@@ -156,6 +159,8 @@ class _Server:
 
     def _fork(self, number: int, request: dict[str, Any]) -> None:
         prepared = _prepared(request)
+        if prepared is not None:
+            self.warmth.warm_up(request, prepared)
         read_end, write_end = os.pipe()
         try:
             pid = os.fork()
@@ -168,7 +173,7 @@ class _Server:
             self._be_the_child(request, prepared, read_end, write_end)
         os.close(write_end)
         os.set_blocking(read_end, False)
-        job = self.jobs[pid] = _Job(number, pid, read_end)
+        job = self.jobs[pid] = _Job(number, request, pid, read_end)
         self.selector.register(read_end, selectors.EVENT_READ, lambda: self._read(job))
         self._send({"id": number, "pid": pid})
 
@@ -227,6 +232,8 @@ class _Server:
         with contextlib.suppress(KeyError):
             self.selector.unregister(job.pipe)
         os.close(job.pipe)
+        if code == 0:
+            self.warmth.prove(job.request)
         self._send({"id": job.number, "exit": code, "log": job.log.text})
 
     def _sweep(self) -> None:
