@@ -1,5 +1,7 @@
 """Every built-in method against the conformance checks; the checks against methods that break them."""
 
+from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +9,7 @@ import pytest
 from commands import bench
 
 from bench.core.errors import InputError
+from bench.execution.launch import Launcher
 from bench.methods._lib.starts import SEEDED
 from bench.plugins.catalog import catalog
 from bench.running.conformance import CHECKS, Finding, check_method
@@ -72,12 +75,19 @@ CONFIGURATIONS = [
 ]
 
 
+@pytest.fixture(scope="module")
+def launchers() -> Iterator[tuple[Launcher, Launcher]]:
+    """Two that have nothing in common, for all methods: each imports what these require once."""
+    with closing(Launcher(threads=1)) as one, closing(Launcher(threads=1)) as other:
+        yield one, other
+
+
 @pytest.mark.parametrize("text", CONFIGURATIONS)
-def test_built_in_methods_conform(text: str) -> None:
+def test_built_in_methods_conform(text: str, launchers: tuple[Launcher, Launcher]) -> None:
     for info, parameters in METHODS.select([text]):
         if info.not_installed():
             pytest.skip(f"{info.name}: {info.install_hint()}")
-        findings = list(check_method(info, parameters))
+        findings = list(check_method(info, parameters, launchers))
         assert len(findings) == len(CHECKS)
         assert [f for f in findings if f.result == "failed"] == []
 

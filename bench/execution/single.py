@@ -43,6 +43,8 @@ class SingleSolver:
         Of each problem.
     use
         What it may use of what comes with the measurements; None for all.
+    launcher
+        Starts the processes; None for one of its own, which it closes.
     """
 
     def __init__(
@@ -51,12 +53,14 @@ class SingleSolver:
         parameters: Mapping[str, Any],
         limits: Limits,
         use: tuple[Information, ...] | None = None,
+        launcher: Launcher | None = None,
     ) -> None:
         self.info = info
         self.parameters = dict(parameters)
         self.limits = limits
         self.use = use
-        self.launcher = Launcher(limits.threads)
+        self.launcher = launcher or Launcher(limits.threads)
+        self._closes = launcher is None
         self._warm_up = True
 
     def __enter__(self) -> Self:
@@ -65,7 +69,8 @@ class SingleSolver:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.launcher.close()
+        if self._closes:
+            self.launcher.close()
 
     def solve(self, problem: Problem, seed: int = 0) -> Answer:
         """Solve one problem."""

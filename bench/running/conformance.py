@@ -17,6 +17,7 @@ from bench.core.errors import InputError
 from bench.core.limits import Limits
 from bench.core.problem import Floats, Problem, oriented
 from bench.core.words import counted
+from bench.execution.launch import Launcher
 from bench.execution.single import Answer, SingleSolver
 from bench.plugins.declare import MethodInfo
 from bench.plugins.references import cite_keys, references
@@ -51,10 +52,17 @@ class Finding:
     detail: str = ""
 
 
-def check_method(info: MethodInfo, parameters: dict[str, Any]) -> Iterator[Finding]:
+def check_method(
+    info: MethodInfo, parameters: dict[str, Any], launchers: tuple[Launcher | None, Launcher | None] = (None, None)
+) -> Iterator[Finding]:
     """Run every check on a configured method, yielding each finding as it is made.
 
     A fault is told once: a method without an answer to an ordinary problem is not asked further.
+
+    Parameters
+    ----------
+    launchers
+        What starts the processes, and those that are to have nothing in common with them; None for new ones.
 
     Raises
     ------
@@ -63,8 +71,9 @@ def check_method(info: MethodInfo, parameters: dict[str, Any]) -> Iterator[Findi
     """
     if info.not_installed(parameters):
         raise InputError(f"method '{info.name}' cannot be checked before: {info.install_hint(parameters)}")
-    with SingleSolver(info, parameters, LIMITS) as solver:
-        kit = _Kit(info, solver)
+    first, other = launchers
+    with SingleSolver(info, parameters, LIMITS, launcher=first) as solver:
+        kit = _Kit(info, solver, other)
         yield from findings(CHECKS, kit)
 
 
@@ -94,6 +103,7 @@ class _Kit:
 
     info: MethodInfo
     solver: SingleSolver
+    other: Launcher | None
 
     def promised(self, fact: str) -> Any:
         """Promise of the method as configured: its attribute of that name, or what its declaration says."""
@@ -118,7 +128,7 @@ class _Kit:
 
     def solve_in_a_fresh_process(self, problem: Problem, seed: int) -> Floats:
         """Where hashes, addresses and the state of libraries are others: children of one server share these."""
-        with SingleSolver(self.info, self.solver.parameters, LIMITS) as solver:
+        with SingleSolver(self.info, self.solver.parameters, LIMITS, launcher=self.other) as solver:
             return self._rotations(solver.solve(problem, seed))
 
     def _rotations(self, answer: Answer) -> Floats:
