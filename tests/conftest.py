@@ -36,11 +36,11 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Failures(terminal))
 
 
-LONGEST = ("test_docs.py", "test_readme.py")
+LONGEST = ("test_readme.py",)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes minutes, lest one process be left with it at the end, or two build the same site."""
+    """Begin with what takes minutes in one test, lest one process be left with it at the end."""
     items.sort(key=lambda item: item.path.name not in LONGEST)
 
 
