@@ -166,9 +166,9 @@ class DMFSynch(Presets):
         return 0.01 if self.preset == "thin" and self.init != "random" else None
 
     @property
-    def depends_on_frames(self) -> bool:
-        """The entry-wise l1 loss does."""
-        return self.loss == "l1"
+    def frames_to_deg(self) -> float:
+        """The entry-wise l1 loss depends on the frames of the cameras."""
+        return 1.0 if self.loss == "l1" else 0.0
 
     def warm_up(self) -> None:
         """Compile the kernels and load what `solve` imports."""

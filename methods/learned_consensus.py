@@ -25,7 +25,7 @@ from ._lib.warm_up import solved_once
     simple_graph=True,
     uses=("weights", "precisions", "gravity"),
     invariant_to_deg=5e-4,
-    depends_on_frames=True,  # it has learned how cameras are held
+    frames_to_deg=None,  # it has learned how cameras are held
 )
 @dataclass(frozen=True)
 class LearnedConsensus(Learned):

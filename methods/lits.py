@@ -19,7 +19,7 @@ from ._lib.learned.lits import network
     robust=True,
     exact_to_deg=None,  # of a ring or a tree it has not learned, but from graphs with many triangles
     invariant_to_deg=5e-4,
-    depends_on_frames=True,  # it has learned how cameras are held
+    frames_to_deg=None,  # it has learned how cameras are held
 )
 @dataclass(frozen=True)
 class LITS(Learned):

@@ -24,7 +24,7 @@ from ._lib.learned.neurora.tree import both_ways, inlier_tree, kept_edges, start
     robust=True,
     simple_graph=True,
     invariant_to_deg=5e-4,
-    depends_on_frames=True,  # CleanNet has learned how cameras are held
+    frames_to_deg=None,  # CleanNet has learned how cameras are held
 )
 @dataclass(frozen=True)
 class NeuRoRA(Learned):

@@ -24,7 +24,7 @@ ENTRY_STEP = 0.2  # threshold of an entry of E in one iteration, which sets the 
     robust=True,
     simple_graph=True,  # X has one block for each pair
     max_cameras=500,
-    depends_on_frames=True,  # entrywise misfits
+    frames_to_deg=2.0,  # entrywise misfits: what turning does to two degrees of noise
 )
 @dataclass(frozen=True)
 class NuclearNorm(Seeded):

@@ -25,7 +25,7 @@ RECONSTRUCTED = "reconstructed from what is said of PoGO-Net: neither its code n
     robust=True,
     simple_graph=True,
     invariant_to_deg=5e-4,
-    depends_on_frames=True,  # it has learned how cameras are held
+    frames_to_deg=0.1,  # it has learned how cameras are held
 )
 @dataclass(frozen=True)
 class PoGONet(Learned, Warm):

@@ -127,6 +127,19 @@ def test_what_is_not_promised_is_skipped_but_an_answer_is_required(
     assert {f.result for f in unsolved} == {"failed"}
 
 
+@pytest.mark.parametrize(("frames_to_deg", "result"), [(0.0, "failed"), (2.0, "passed"), (None, "skipped")])
+def test_turned_frames_have_a_promise_of_their_own(
+    frames_to_deg: float | None, result: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bench.running.conformance.CHECKS", (CHECKS[6], CHECKS[9]))
+    info = METHODS["nuclear-norm"]
+    promising = replace(info, facts={**info.facts, "frames_to_deg": frames_to_deg})
+    assert [(f.check, f.result) for f in check_method(promising, {})] == [
+        ("relabelled cameras", "passed"),
+        ("rotated frames", result),
+    ]
+
+
 def failed(plugin: Path, fault: str) -> set[str]:
     info = catalog("method", [plugin])["faulty"]
     return {f.check for f in check_method(info, {"fault": fault}) if f.result == "failed"}

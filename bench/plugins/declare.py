@@ -182,7 +182,7 @@ def method(
     uses: tuple[Information, ...] = (),
     simple_graph: bool = False,
     depends_on_labels: bool = False,
-    depends_on_frames: bool = False,
+    frames_to_deg: float | None = 0.0,
 ) -> Callable[[T], T]:
     """Declare a frozen dataclass with a `solve` method as a method.
 
@@ -206,8 +206,8 @@ def method(
     exact_to_deg
         How closely it promises to recover small noise-free problems; None promises nothing.
     invariant_to_deg
-        How far relabelling cameras, permuting or reversing edges and turning the frames of cameras, all by one
-        rotation, may move its answer to a small noisy problem; None promises nothing.
+        How far relabelling cameras, permuting or reversing edges and turning frames may move its answer to a small
+        noisy problem; None promises nothing.
     uses
         What it takes of what comes with the measurements: any of "weights", "precisions" and "gravity". The rest is
         not given to it, so that a row never depends on what its table does not say.
@@ -216,9 +216,9 @@ def method(
     depends_on_labels
         Whether its answer depends on the names of the cameras, in ways that no seed of its own governs: from the second
         seed on they are permuted, so that the spread over seeds shows how much.
-    depends_on_frames
-        Whether turning frames may move its answer by any angle, as where it has learned how cameras are held or judges
-        matrices entry by entry: `invariant_to_deg` then says nothing of it.
+    frames_to_deg
+        How much farther turning the frames of cameras, all by one rotation, may move it, as where it judges matrices
+        entry by entry; None promises nothing, as where it has learned how cameras are held.
     """
     facts = {
         "install": install,
@@ -233,7 +233,7 @@ def method(
         "uses": uses,
         "simple_graph": simple_graph,
         "depends_on_labels": depends_on_labels,
-        "depends_on_frames": depends_on_frames,
+        "frames_to_deg": frames_to_deg,
     }
     return _declare("method", name, title, cite, requires, facts, "solve")
 

@@ -22,7 +22,6 @@ _IN_WORDS = {
     "certifies": "able to prove optimality",
     "simple_graph": "given parallel edges fused",
     "depends_on_labels": "dependent on the names of the cameras, which are permuted from the second seed on",
-    "depends_on_frames": "dependent on how cameras are held",
     "fetchable": "fetched by `data fetch`",
     "takes_paths": "selected by the path of a file or folder",
 }
@@ -139,14 +138,16 @@ def _promises(declared: Mapping[str, Any]) -> list[str]:
     """What `check` and the tests hold a method to; nothing of a dataset."""
     if "deterministic" not in declared:
         return []
-    moved, exact = declared["invariant_to_deg"], declared["exact_to_deg"]
-    changes = "relabelling, permuting" + (
-        " and reversing" if declared["depends_on_frames"] else ", reversing and turning"
+    moved, exact, frames = (declared[name] for name in ("invariant_to_deg", "exact_to_deg", "frames_to_deg"))
+    changes = (
+        "relabelling, permuting and reversing" if frames is None else "relabelling, permuting, reversing and turning"
     )
     return [
         "the same answer whatever the seed" if declared["deterministic"] else "another answer under another seed",
         f"small noise-free problems recovered to {exact:g}°"
         if exact is not None
         else "nothing of small noise-free problems",
-        f"{changes} move its answer by {moved:g}° at most" if moved is not None else f"nothing of {changes}",
+        f"{changes} move its answer by {moved:g}° at most" + (f", turning by {frames:g}° more" if frames else "")
+        if moved is not None
+        else f"nothing of {changes}",
     ]

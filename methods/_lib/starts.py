@@ -54,7 +54,7 @@ class Refined(Started):
         return False
 
     @property
-    def exact_to_deg(self) -> float | None:
+    def exact_to_deg(self) -> float:
         """From a random start only as near as the last step tells."""
         return self.tolerance_deg if self.init == "random" else 1e-6
 
