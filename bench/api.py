@@ -281,7 +281,7 @@ def recommend(
     methods
         Selections of candidates in place of the suite's.
     budget_s
-        Seconds for the candidates.
+        Seconds for the candidates, once they are compiled.
     out
         Folder in which the run on the twins is kept.
     data_dir, jobs, plugins

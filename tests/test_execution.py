@@ -107,6 +107,41 @@ def test_without_fork_a_fresh_interpreter_does_the_same(faulty_plugin: Path, mon
     assert solve(faulty_plugin, "segfault").outcome.text == "crashed(SIGSEGV)"
 
 
+SLOW_TO_COMPILE = """
+import time
+from dataclasses import dataclass
+import numpy as np
+from bench import method
+
+
+@method("slow-to-compile", title="Slow to compile")
+@dataclass(frozen=True)
+class SlowToCompile:
+    solve_s: float = 0.0
+
+    def warm_up(self):
+        time.sleep(1.5)
+
+    def solve(self, problem, rng):
+        time.sleep(self.solve_s)
+        return np.tile(np.eye(3), (problem.n, 1, 1))
+"""
+
+
+@pytest.mark.parametrize(
+    "forks", [pytest.param(True, marks=pytest.mark.skipif(not launch.CAN_FORK, reason="there is no fork here")), False]
+)
+def test_the_clock_starts_once_the_method_is_compiled(
+    tmp_path: Path, forks: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(launch, "CAN_FORK", forks)
+    (tmp_path / "slow.py").write_text(SLOW_TO_COMPILE)
+    info = catalog("method", [tmp_path / "slow.py"])["slow-to-compile"]
+    for solve_s, text in ((0.0, "ok"), (30.0, "timeout(1 s)")):
+        with SingleSolver(info, {"solve_s": solve_s}, Limits(1.0, memory_gib=1.0)) as solver:
+            assert solver.solve(triangle()).outcome.text == text
+
+
 WARM = '''
 """Tells which processes warm up and which solve; something may be wrong with the second that warms up."""
 import os, time

@@ -125,6 +125,38 @@ def test_a_graph_without_triangles_is_told_that_its_twins_are_not_to_be_trusted(
     assert "Error to expect" not in told
 
 
+SLOW_AT_FIRST = """
+import time
+from dataclasses import dataclass
+from pathlib import Path
+import numpy as np
+from bench import method
+
+
+@method("slow-at-first", title="Slow at first")
+@dataclass(frozen=True)
+class SlowAtFirst:
+    compiled: str = ""
+
+    def warm_up(self):
+        if not Path(self.compiled).exists():
+            time.sleep(5)
+            Path(self.compiled).touch()
+
+    def solve(self, problem, rng):
+        return np.tile(np.eye(3), (problem.n, 1, 1))
+"""
+
+
+def test_what_is_compiled_at_first_costs_no_candidate_its_turn(tmp_path: Path) -> None:
+    (tmp_path / "slow.py").write_text(SLOW_AT_FIRST)
+    graph = written(simulated(random_edges(10, 1.0))[0], tmp_path / "graph.npz")
+    candidates = [f"slow-at-first[compiled={tmp_path / 'compiled'}]", "spectral"]
+    asked = recommend(graph, candidates, budget_s=8, jobs=1, plugins=[tmp_path / "slow.py"])
+    assert asked.trial.left_out == ()
+    assert asked.trial.seconds < 8
+
+
 def test_what_is_no_graph_or_several_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"stands for \d+ graphs: name one"):
         load("small-graphs")

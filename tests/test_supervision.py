@@ -168,9 +168,16 @@ def test_the_nearer_the_memory_limit_the_more_often_it_is_looked_at(monkeypatch:
     used = iter([0.5, 3.0, 3.8, 3.99, 4.01])
     monkeypatch.setattr(processes, "resident_gib", lambda pids: next(used))
     child = Growing()
-    ended = supervise.supervise(child, Limits(seconds=1000, memory_gib=4), threading.Event())
+    ended = supervise.supervise(child, Limits(seconds=1000, memory_gib=4), threading.Event(), begun=lambda: True)
     assert ended == outcome.Outcome(outcome.OUT_OF_MEMORY, "4 GiB")
     assert child.pauses == pytest.approx([0.1, 0.1, 0.1, 0.05, 0.01, 0.0])
+
+
+def test_a_method_that_never_begins_is_ended_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(supervise, "PREPARING_S", 0.0)
+    monkeypatch.setattr(processes, "resident_gib", lambda pids: 0.0)
+    ended = supervise.supervise(Growing(), Limits(seconds=1000, memory_gib=4), threading.Event(), begun=lambda: False)
+    assert ended == outcome.Outcome(outcome.TIMEOUT, "0 s to begin")
 
 
 OK = {"kind": "ok", "detail": ""}

@@ -71,7 +71,7 @@ def recommend(
     methods
         Selections in place of the suite's candidates; with these, twins alone decide.
     budget_s
-        Seconds for the run on the twins.
+        Seconds for the run on the twins, once candidates are compiled.
     tell
         Is told what is done.
 

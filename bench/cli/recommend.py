@@ -13,7 +13,9 @@ def recommend(
         str,
         typer.Argument(metavar="GRAPH", help="A file or folder (see `data formats`), or a selection of a dataset."),
     ],
-    budget: Annotated[float, typer.Option(metavar="SECONDS", help="For the candidates on the twins.")] = 60.0,
+    budget: Annotated[
+        float, typer.Option(metavar="SECONDS", help="For the candidates on the twins, once they are compiled.")
+    ] = 60.0,
     method: Annotated[
         list[str] | None,
         typer.Option(

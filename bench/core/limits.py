@@ -10,7 +10,7 @@ class Limits:
     Parameters
     ----------
     seconds
-        Wall clock.
+        Wall clock, from when the method is compiled and loaded.
     memory_gib
         Resident memory of the child and its descendants.
     threads

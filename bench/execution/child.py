@@ -1,9 +1,11 @@
 """What happens inside the process that runs a method.
 
 The process is given the problem, never the truth: a request names the file of the problem, the method and
-the folder for its two results, ``estimate.npz`` and ``result.json`` (written last).
+the folder for its two results, ``estimate.npz`` and ``result.json`` (written last); before it solves, it puts the empty
+file ``begun`` there.
 """
 
+import contextlib
 import copy
 import dataclasses
 import errno
@@ -29,7 +31,7 @@ from bench.core.outcome import Outcome
 from bench.core.problem import Estimate, Information, Problem, Skipped
 from bench.core.seeds import stream
 from bench.execution.given import Given
-from bench.execution.output import ESTIMATE_FILE, RESULT_FILE, Result
+from bench.execution.output import BEGUN_FILE, ESTIMATE_FILE, RESULT_FILE, Result
 from bench.execution.threads import pin_threads
 from bench.execution.validate import kept_warnings, reported, what_is_wrong
 from bench.plugins.catalog import method_at
@@ -138,6 +140,8 @@ def solve(request: Request, prepared: Prepared) -> Result:
     report = Report(threads=pin_threads(request.threads), core=_pin_core(request.core))
     if request.warm_up and hasattr(method, "warm_up"):
         method.warm_up()
+    with contextlib.suppress(OSError):
+        Path(request.folder, BEGUN_FILE).touch()
 
     used = tuple(sorted(given.problem.carries))
     pristine = copy.copy(given.problem)  # what a solution caches in its problem, the next one must not find

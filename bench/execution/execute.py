@@ -13,7 +13,7 @@ from bench.core.outcome import Outcome
 from bench.execution import provenance
 from bench.execution.child import Request
 from bench.execution.launch import Launcher, LaunchError, ServerLostError
-from bench.execution.output import Result, UnusableError, read_output
+from bench.execution.output import BEGUN_FILE, Result, UnusableError, read_output
 from bench.execution.supervise import supervise
 from bench.storage.record import Record, Report
 from bench.suite.plan import Job
@@ -75,8 +75,10 @@ def _attempt(
     request: Request, requires: tuple[str, ...], launcher: Launcher, limits: Limits, stop: threading.Event
 ) -> tuple[Result, str]:
     kills = outcome.kernel_kills()
+    begun = Path(request.folder, BEGUN_FILE)
+    begun.unlink(missing_ok=True)
     child = launcher.start(request, requires)
-    ended = supervise(child, limits, stop)
+    ended = supervise(child, limits, stop, begun.exists)
     result = Result(ended, Report()) if isinstance(ended, Outcome) else _left(Path(request.folder), ended, kills)
     log = child.log[-LOG_OF_OK:] if result.outcome.ok else child.log
     return result, log if log.strip() else ""

@@ -14,6 +14,7 @@ from bench.storage.record import Report
 
 ESTIMATE_FILE = "estimate.npz"
 RESULT_FILE = "result.json"
+BEGUN_FILE = "begun"  # empty; the method is compiled and loaded
 LARGEST_RESULT = 2**24  # bytes; the scalars of a few hundred thousand checkpoints fit into it
 OF_CHILDREN = (outcome.OK, outcome.SKIPPED, outcome.ERROR, outcome.OUT_OF_MEMORY, outcome.INVALID_OUTPUT)
 
