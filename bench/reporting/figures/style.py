@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from bench.reporting import appearance
+from bench.reporting.figures import plain_font
 from bench.reporting.figures.looks import GREY
 from bench.reporting.tables.latex import latex_escape
 
@@ -47,8 +48,12 @@ def styled() -> Iterator[None]:
     size = {"font.size": wanted.font_size, "axes.titlesize": wanted.font_size, "legend.fontsize": "small"}
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update(SETTINGS | size | ({"font.family": wanted.font} if wanted.font else {}))
+        mpl.rcParams.update(SETTINGS | size | _font(wanted.font))
         yield
+
+
+def _font(wanted: str) -> dict[str, Any]:
+    return {"font.family": wanted} if wanted else {"font.sans-serif": [plain_font.family(), plain_font.OF]}
 
 
 def columns_of(count: int) -> int:
