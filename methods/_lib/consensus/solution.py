@@ -28,7 +28,7 @@ ENOUGH_TRIANGLES = 1.0  # over an edge, on average, to vouch for edges
 UNSUPPORTED = 1e-3  # triangles, in place of none at an edge
 START_DEG, START = 8.0, 4.0  # where the scales of the cameras begin to fall; the larger of degrees and noise scales
 STEPS_OF_L1, ENOUGH = 10, np.radians(0.057)  # of least absolute residuals, and the step that is the last
-STEPS_OF_GROWN, STEPS = 6, 12  # of least squares, for each solution that was grown and for the final one
+STEPS = 12  # of least squares, for each solution that was grown and for the final one
 TOGETHER_DEG = 2.0  # where the scales of the final one begin
 JUDGED, JUDGED_WIDE = 0.5, 2.0  # noise scales at which solutions are compared
 APART = 4.0  # noise scales by which pieces stand elsewhere
@@ -130,5 +130,5 @@ def _least_absolute(problem: Problem) -> Floats:
 def _settled(problem: Problem, settling: Settling, start: Floats, widest: float, narrowest: float) -> Descent:
     """A start (n, 3, 3) after reweighted least squares, with scales that fall from the widest; radians."""
     descent = Descent(problem, start, 0.0)
-    settling.settle(descent, widest, STEPS_OF_GROWN, narrowest)
+    settling.settle(descent, widest, STEPS, narrowest)
     return descent
