@@ -49,11 +49,18 @@ def test_every_page_is_in_the_navigation() -> None:
     assert [page for page in pages if page not in listed] == []
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def test_the_site(tmp_path: Path) -> None:
+    """In one test, since what it takes is to build it."""
+    built = build(tmp_path / "pages")
+    it_loads_nothing_from_the_network(built)
+    every_plugin_has_a_page_with_its_numbers(built)
+    the_tutorial_is_shown_with_what_it_printed(built)
+    the_reference_has_every_name_of_the_door(built)
+
+
+def build(folder: Path) -> Path:
     for package in ("material", "mkdocstrings", "jupytext", "nbconvert", "ipykernel"):
         pytest.importorskip(package, reason="the site needs: python -m pip install -e '.[docs]'")
-    folder = tmp_path_factory.mktemp("site") / "pages"
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     offline = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
     done = subprocess.run(command, cwd=ROOT, env=os.environ | offline, capture_output=True, text=True, timeout=900)
@@ -61,14 +68,14 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_site_loads_nothing_from_the_network(built: Path) -> None:
+def it_loads_nothing_from_the_network(built: Path) -> None:
     pages = list(built.rglob("*.html"))
     assert len(pages) > 60
     loads = {(page.name, found) for page in pages for found in EXTERNAL.findall(page.read_text(encoding="utf-8"))}
     assert {found for _, found in loads if 'rel="canonical"' not in found} == set()
 
 
-def test_every_plugin_has_a_page_with_its_numbers(built: Path) -> None:
+def every_plugin_has_a_page_with_its_numbers(built: Path) -> None:
     for kind in ("method", "dataset"):
         for info in catalog(kind):  # type: ignore[call-overload]
             page = (built / f"{kind}s/{info.name}.html").read_text(encoding="utf-8")
@@ -80,7 +87,7 @@ def test_every_plugin_has_a_page_with_its_numbers(built: Path) -> None:
     assert (built / "leaderboard/index.html").is_file()
 
 
-def test_the_tutorial_is_shown_with_what_it_printed(built: Path) -> None:
+def the_tutorial_is_shown_with_what_it_printed(built: Path) -> None:
     page = (built / "tutorials/your-own-flight.html").read_text(encoding="utf-8")
     assert "database: 72 cameras" in page
     assert re.search(r'<img[^>]*src="your-own-flight_\d+_\d+.png"', page)
@@ -88,7 +95,7 @@ def test_the_tutorial_is_shown_with_what_it_printed(built: Path) -> None:
     assert any(cell.get("outputs") for cell in notebook["cells"])
 
 
-def test_the_reference_has_every_name_of_the_door(built: Path) -> None:
+def the_reference_has_every_name_of_the_door(built: Path) -> None:
     import bench
 
     page = (built / "api.html").read_text(encoding="utf-8")
