@@ -29,11 +29,13 @@ def test_it_has_the_same_letters_at_the_same_places(weight: str) -> None:
 
 
 def test_it_is_what_figures_use_and_is_made_anew_where_it_is_missing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(mpl, "get_cachedir", lambda: str(tmp_path))
     plain_font.family.cache_clear()
+    caplog.clear()
     with styled():
         assert mpl.rcParams["font.sans-serif"][0] == plain_font.family()
     assert [path.suffix for path in tmp_path.iterdir()] == [".ttf", ".ttf"]
+    assert caplog.messages == []
     plain_font.family.cache_clear()

@@ -14,6 +14,7 @@ FAMILY = "DejaVu Sans Plain"
 NAMES = (1, 4, 16)  # in a font's table of names: of its family, in full, and of its family once more
 LETTERS = (*range(0x20, 0x530), *range(0x1E00, 0x2C00))  # Latin, Greek and Cyrillic; punctuation, arrows, mathematics
 SCRIPTS = ["GSUB", "GPOS", "GDEF"]  # joined letters, marks on letters; kerning has a table of its own
+OF_EDITORS = ["FFTM"]  # when the font was made
 
 
 @functools.cache
@@ -37,7 +38,7 @@ def _plain(font: Path) -> Path:
     if path.exists():
         return path
     options = subset.Options(legacy_kern=True, glyph_names=True, notdef_outline=True, name_IDs=["*"])
-    options.drop_tables += SCRIPTS
+    options.drop_tables += SCRIPTS + OF_EDITORS
     letters = subset.Subsetter(options)
     letters.populate(unicodes=LETTERS)
     with TTFont(font, lazy=True) as content:
