@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from runs import Made, made_run
 
 from bench.plugins.catalog import catalog
-from bench.plugins.selection import label
+from bench.plugins.selection import format_parameters, label
 from bench.reporting.figures import paint_matplotlib, paint_plotly
 from bench.reporting.figures.data import MeanRanks
 from bench.reporting.figures.errors import Run, quantiles
@@ -25,6 +25,7 @@ from bench.reporting.present import drawings
 from bench.reporting.tables.rows import scenes
 from bench.reporting.tables.standing import overall
 from bench.scoring.results import Results, score
+from bench.suite.experiment import load_suite, suite_names
 
 SCENES = ("P", "Q", "R")
 METHODS = (
@@ -210,7 +211,7 @@ class TestLooks:
 
     def test_are_the_same_from_run_to_run(self) -> None:
         look = look_of("some-method[depth=3]")
-        assert (look.color, look.line, look.marker) == ("#56B4E9", (0, (4, 1.5)), "s")
+        assert (look.color, look.line, look.marker) == ("#56B4E9", (0, (5, 1.5, 1, 1.5)), "X")
 
     def test_of_configurations_share_the_colour_and_nothing_else(self) -> None:
         plain, *others = (look_of(label("m", params)) for params in ("", *(f"depth={k}" for k in range(2, 7))))
@@ -225,6 +226,13 @@ class TestLooks:
         assert len({(look.color, str(look.line)) for look in own}) == len(own)
         shares = [sum(look.color == color for look in own) for color in COLORS]
         assert max(shares) <= 6
+
+    def test_of_the_configurations_of_our_suites_all_differ(self) -> None:
+        chosen = [one for name in suite_names() for one in catalog("method").select(load_suite(name).methods)]
+        shown = {label(info.name, format_parameters(parameters)) for info, parameters in chosen}
+        configured = [look_of(selection) for selection in shown | set(catalog("method").entries)]
+        assert sum("[" in look.label for look in configured) > 5
+        assert len({(look.color, look.marker) for look in configured}) == len(configured)
 
     def test_are_the_same_in_both_painters(self, run: Results) -> None:
         drawing = drawings(run)["cumulative-errors"]

@@ -21,6 +21,7 @@ LINES: tuple[Any, ...] = (
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p", "*", "d")
 GREY = "#666666"
 SALT = 955346488  # found by trial: no two of our own methods share colour and line, so none shares colour and marker
+OF_CONFIGURATIONS = 187609  # found by trial: nor do any two configurations of our suites share colour and marker
 FACTOR = 37  # prime to the numbers of markers and lines: values of a parameter that differ in a digit look different
 LABEL = 24  # characters of a line
 
@@ -47,7 +48,7 @@ def look_of(selection: str) -> Look:
     method, _, params = selection.removesuffix("]").partition("[")
     hashed = int.from_bytes(hashlib.blake2s(method.encode()).digest()[:4], "big") * SALT % 2**32
     slot, color = divmod(hashed >> 8, len(COLORS))
-    line, marker, turn = slot, slot, 0
+    line, marker, turn = slot, slot, hashed * OF_CONFIGURATIONS % 2**32 >> 8
     for character in params:
         turn = FACTOR * turn + ord(character)
     if params:
