@@ -211,7 +211,7 @@ class TestLooks:
 
     def test_are_the_same_from_run_to_run(self) -> None:
         look = look_of("some-method[depth=3]")
-        assert (look.color, look.line, look.marker) == ("#56B4E9", (0, (5, 1.5, 1, 1.5)), "X")
+        assert (look.color, look.line, look.marker) == ("#CC79A7", (0, (5, 1.5, 1, 1.5)), "X")
 
     def test_of_configurations_share_the_colour_and_nothing_else(self) -> None:
         plain, *others = (look_of(label("m", params)) for params in ("", *(f"depth={k}" for k in range(2, 7))))
@@ -233,6 +233,10 @@ class TestLooks:
         configured = [look_of(selection) for selection in shown | set(catalog("method").entries)]
         assert sum("[" in look.label for look in configured) > 5
         assert len({(look.color, look.marker) for look in configured}) == len(configured)
+
+    def test_of_the_methods_of_the_main_command_differ_in_colour(self) -> None:
+        methods = {info.name for info, _ in catalog("method").select(load_suite("quick").methods)}
+        assert len({look_of(name).color for name in methods}) == len(methods) == len(COLORS)
 
     def test_are_the_same_in_both_painters(self, run: Results) -> None:
         drawing = drawings(run)["cumulative-errors"]

@@ -20,8 +20,9 @@ LINES: tuple[Any, ...] = (
 )
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p", "*", "d")
 GREY = "#666666"
-SALT = 955346488  # found by trial: no two of our own methods share colour and line, so none shares colour and marker
-OF_CONFIGURATIONS = 187609  # found by trial: nor do any two configurations of our suites share colour and marker
+# Found by trial: no two of our own methods share colour and line or colour and marker, and no two configurations of our
+# suites colour and marker; the methods of the suite `quick`, and those that are most compared, differ in colour.
+COLOR_SALT, LINE_SALT, MARKER_SALT, CONFIGURED_SALT = 93067, 14132465, 1739, 3
 FACTOR = 37  # prime to the numbers of markers and lines: values of a parameter that differ in a digit look different
 LABEL = 24  # characters of a line
 
@@ -46,14 +47,15 @@ def look_of(selection: str) -> Look:
     line or the marker of the method itself.
     """
     method, _, params = selection.removesuffix("]").partition("[")
-    hashed = int.from_bytes(hashlib.blake2s(method.encode()).digest()[:4], "big") * SALT % 2**32
-    slot, color = divmod(hashed >> 8, len(COLORS))
-    line, marker, turn = slot, slot, hashed * OF_CONFIGURATIONS % 2**32 >> 8
-    for character in params:
-        turn = FACTOR * turn + ord(character)
+    hashed = int.from_bytes(hashlib.blake2s(method.encode()).digest()[:4], "big")
+    color, line, marker, turn = (
+        hashed * salt % 2**32 >> 16 for salt in (COLOR_SALT, LINE_SALT, MARKER_SALT, CONFIGURED_SALT)
+    )
     if params:
+        for character in params:
+            turn = FACTOR * turn + ord(character)
         line, marker = line + 1 + turn % (len(LINES) - 1), marker + 1 + turn % (len(MARKERS) - 1)
-    return Look(selection, COLORS[color], LINES[line % len(LINES)], MARKERS[marker % len(MARKERS)])
+    return Look(selection, COLORS[color % len(COLORS)], LINES[line % len(LINES)], MARKERS[marker % len(MARKERS)])
 
 
 def looks(frame: pd.DataFrame) -> dict[Configured, Look]:
