@@ -5,7 +5,7 @@ from pathlib import Path
 import matplotlib as mpl
 import pytest
 from fontTools.ttLib import TTFont
-from matplotlib.font_manager import FontProperties, findfont
+from matplotlib.font_manager import FontProperties, findfont, fontManager
 from matplotlib.textpath import TextPath
 
 from bench.reporting.figures import plain_font
@@ -32,6 +32,7 @@ def test_it_is_what_figures_use_and_is_made_anew_where_it_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(mpl, "get_cachedir", lambda: str(tmp_path))
+    monkeypatch.setattr(fontManager, "ttflist", list(fontManager.ttflist))  # which forgets the files of this test
     plain_font.family.cache_clear()
     caplog.clear()
     with styled():

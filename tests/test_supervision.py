@@ -173,11 +173,14 @@ def test_the_nearer_the_memory_limit_the_more_often_it_is_looked_at(monkeypatch:
     assert child.pauses == pytest.approx([0.1, 0.1, 0.1, 0.05, 0.01, 0.0])
 
 
-def test_a_method_that_never_begins_is_ended_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(supervise, "PREPARING_S", 0.0)
+@pytest.mark.parametrize(("preparing_s", "limit_s"), [(0.2, 0.1), (0.1, 0.2)])
+def test_a_method_that_never_begins_is_ended_too(
+    preparing_s: float, limit_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervise, "PREPARING_S", preparing_s)
     monkeypatch.setattr(processes, "resident_gib", lambda pids: 0.0)
-    ended = supervise.supervise(Growing(), Limits(seconds=1000, memory_gib=4), threading.Event(), begun=lambda: False)
-    assert ended == outcome.Outcome(outcome.TIMEOUT, "0 s to begin")
+    ended = supervise.supervise(Growing(), Limits(limit_s, memory_gib=4), threading.Event(), begun=lambda: False)
+    assert ended == outcome.Outcome(outcome.TIMEOUT, "0.2 s to begin")
 
 
 OK = {"kind": "ok", "detail": ""}

@@ -12,7 +12,7 @@ from bench.execution.launch import Child
 
 SHORTEST_S, LONGEST_S = 0.01, 0.1  # between two looks at a child
 FASTEST_GIB_S = 4.0  # how fast a process may be thought to fill memory
-PREPARING_S = 120.0  # for a method to compile its kernels, and to load what it needs
+PREPARING_S = 120.0  # for a method to compile its kernels and to load what it needs, where its limit is no longer
 
 
 class Interrupted(Exception):  # noqa: N818 - the user's wish, not an error
@@ -23,9 +23,9 @@ def supervise(child: Child, limits: Limits, stop: threading.Event, begun: Callab
     """Wait for the child to end; return its exit code, or the outcome where a limit ended it.
 
     The wall clock starts once the method has `begun`, lest it depend on what is compiled already whether it is done
-    in time; until then the child has `PREPARING_S`. However this returns, nothing that the child started is left. The
-    memory that counts is resident memory: a limit on address space makes numerical libraries hang at import. The nearer
-    a child is to its limit, the more often its memory is looked at.
+    in time; until then the child has as long, or `PREPARING_S`. However this returns, nothing that the child started
+    is left. The memory that counts is resident memory: a limit on address space makes numerical libraries hang at
+    import. The nearer a child is to its limit, the more often its memory is looked at.
 
     Raises
     ------
@@ -34,7 +34,8 @@ def supervise(child: Child, limits: Limits, stop: threading.Event, begun: Callab
     ServerLostError
         Where the child died with its server.
     """
-    deadline, solving = time.monotonic() + PREPARING_S, False
+    preparing_s = max(PREPARING_S, limits.seconds)
+    deadline, solving = time.monotonic() + preparing_s, False
     used_gib = 0.0
     try:
         while True:
@@ -48,7 +49,7 @@ def supervise(child: Child, limits: Limits, stop: threading.Event, begun: Callab
             if not solving and begun():
                 deadline, solving = time.monotonic() + limits.seconds, True
             elif remaining <= 0:
-                return Outcome(outcome.TIMEOUT, f"{limits.seconds:g} s" if solving else f"{PREPARING_S:g} s to begin")
+                return Outcome(outcome.TIMEOUT, f"{limits.seconds:g} s" if solving else f"{preparing_s:g} s to begin")
             used_gib = processes.resident_gib(processes.family(child.pid))
             if used_gib > limits.memory_gib:
                 return Outcome(outcome.OUT_OF_MEMORY, f"{limits.memory_gib:g} GiB")

@@ -9,16 +9,17 @@ reads what methods do; results/reference/consensus has what it said.
 """
 
 import argparse
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from ablate_consensus import instances
 
 from bench.core import so3
 from bench.core.problem import Estimate, Floats, Instance, Problem
 from bench.core.seeds import stream
 from bench.plugins.catalog import catalog
-from bench.plugins.declare import Method, Source
+from bench.plugins.declare import Method
+from bench.plugins.selection import format_parameters, label
 from bench.scoring.metrics.alignment import align
 
 COLLECTIONS = {
@@ -37,12 +38,13 @@ def main() -> None:
     parser.add_argument("--data-dir", type=Path, required=True)
     parser.add_argument("--share", type=float, default=0.05)
     given = parser.parse_args()
-    methods = {info.name: info.configure(p) for info, p in catalog("method").select(given.methods)}
+    chosen = catalog("method").select(given.methods)
+    methods = {label(info.name, format_parameters(p)): info.configure(p) for info, p in chosen}
     print("| collection | method | mean | edges left out | within 10 degrees | edges left out |")
     print("|:--|:--|:-:|:-:|:-:|:-:|")
     for name, selection in COLLECTIONS.items():
-        graphs = list(instances(selection, given.data_dir))
-        for label, method in methods.items():
+        graphs = list(instances(selection, range(1), 1, given.data_dir))
+        for shown, method in methods.items():
             whole = np.array([figures(method, graph, graph.problem) for graph in graphs]).mean(axis=0)
             rng = stream(0, "data", "left out")
             drawn = np.array(
@@ -55,15 +57,7 @@ def main() -> None:
                 f"{a:.2f} | {b.mean():.2f} ({np.quantile(b, 0.05):.2f} to {np.quantile(b, 0.95):.2f})"
                 for a, b in zip(whole, drawn.T, strict=True)
             )
-            print(f"| {name} ({len(graphs)}) | {label} | {mean} | {near} |", flush=True)
-
-
-def instances(selection: str, data_dir: Path) -> Iterator[Instance]:
-    """Those on disk whose truth is known."""
-    for info, parameters in catalog("dataset").select([selection]):
-        for source in info.configure(parameters).sources(data_dir, 0):
-            if isinstance(source, Source) and (instance := source.load()).truth is not None:
-                yield instance
+            print(f"| {name} ({len(graphs)}) | {shown} | {mean} | {near} |", flush=True)
 
 
 def without(problem: Problem, share: float, rng: np.random.Generator) -> Problem:

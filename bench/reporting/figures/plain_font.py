@@ -2,6 +2,7 @@
 
 import functools
 import os
+import zlib
 from pathlib import Path
 
 import matplotlib as mpl
@@ -34,7 +35,8 @@ def family() -> str:
 
 def _plain(font: Path) -> Path:
     """The file of a font with these letters alone, under another name."""
-    path = Path(mpl.get_cachedir(), f"{font.stem}-plain-{mpl.__version__}.ttf")
+    made_of = zlib.crc32(repr((font, font.stat().st_size, FAMILY, LETTERS, SCRIPTS, OF_EDITORS)).encode())
+    path = Path(mpl.get_cachedir(), f"{font.stem}-plain-{made_of:08x}.ttf")
     if path.exists():
         return path
     options = subset.Options(legacy_kern=True, glyph_names=True, notdef_outline=True, name_IDs=["*"])
